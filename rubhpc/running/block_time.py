@@ -27,8 +27,7 @@ _MOST = 8  # of the first blocks, that are written
 def time_block(manifest: Manifest, arrays: dict[str, NDArray[Any]]) -> float:
     """Processor seconds of a block full of a case's arrays, written to a temporary folder; 0 without one.
 
-    Its files are those of the store, and so are the folders that have to be made for them: a block of one
-    short case takes longer to write than to compute.
+    It has the files and folders of a store: a block of one short case takes longer to write than to compute.
     """
     n_case = math.prod(manifest.chunk)
     data: dict[str, NDArray[Any]] = {}
@@ -41,7 +40,7 @@ def time_block(manifest: Manifest, arrays: dict[str, NDArray[Any]]) -> float:
         with tempfile.TemporaryDirectory() as folder:
             files = BlockFiles(Path(folder), manifest)
             n_block = [-(-n // k) for n, k in zip(manifest.shape, manifest.chunk, strict=True)]
-            for place in islice(np.ndindex(*n_block), _MOST):  # they share folders as those of a run do
+            for place in islice(np.ndindex(*n_block), _MOST):  # they share folders as in a run
                 began = time.process_time()
                 for i in range(n_case):
                     case_checksum(data, i)
@@ -51,6 +50,6 @@ def time_block(manifest: Manifest, arrays: dict[str, NDArray[Any]]) -> float:
                     write_whole(path, layout.encode(values), is_synced=False)
                     flush_to_disk(path)
                 taken.append(time.process_time() - began)
-    except OSError:  # no room for it, or no folder
+    except OSError:  # the disk is full, or there is no folder
         return 0.0
     return float(np.mean(taken))

@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from rubhpc.study.study import Study
 
 
-_ENOUGH_STATORS = 2  # one pair alone takes other ways than several
+_ENOUGH_STATORS = 2  # a single pair is treated differently from several
 
 
 def set_up(study: Study, case: Case, model: Model | None = None) -> Setup:
-    """What the cases of this rig, speed and contact share; `model` is the rig's, if it is assembled."""
+    """Set-up that the cases of this rig, speed and contact share; `model` is the assembled rig, if known."""
     drive = case.speed_law if isinstance(case.speed_law, DriveLaw) else None
     return prepare(
         case.rig,
@@ -35,7 +35,7 @@ def set_up(study: Study, case: Case, model: Model | None = None) -> Setup:
 
 
 def set_up_for_kernels(study: Study, case: Case) -> Setup:
-    """What calls the kernels of this case at little cost: the first stators of a ring stand for all.
+    """Set-up that calls the kernels of this case at little cost, with the first stators of a ring.
 
     Even two revolutions in a large ring may take as long as kernels take to load, for its contact modes.
     """
@@ -46,7 +46,7 @@ def set_up_for_kernels(study: Study, case: Case) -> Setup:
 
 
 def operation_of(grid: CaseGrid, case: Case) -> Operation:
-    """How the rig of a case runs, its speed and clearance as the axes give them."""
+    """Operation of the rig of a case, with speed and clearance as given by the axes."""
     axes = grid.study.axes
     given = dict(zip([axis.name for axis in axes], grid.points.at(case.index), strict=True))
     return Operation(

@@ -29,11 +29,11 @@ if TYPE_CHECKING:
     from rubhpc.storage.journal import Entry
     from rubhpc.study.cases import Block
 
-_PACKING_GAP = 600.0  # s between packings while a run is on; one takes 5 s for a million cases
+_PACKING_GAP = 600.0  # s between packings during a run; one takes 5 s for a million cases
 
 
 class Computing:
-    """What a rank computes of a job.
+    """One rank's computation of a job.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ class Computing:
         return bool(self._stopping.look() or sums.stop or has_failed)
 
     def _pack_for_readers(self) -> None:
-        """Have the first rank pack the journals now and then, for readers who look on."""
+        """Let the first rank pack the journals from time to time, for readers during the run."""
         is_due = time.monotonic() > self._next_packing
         if is_due and self._pool.rank == 0 and self._job.part is None:
             self._store.pack(self._store.replay())

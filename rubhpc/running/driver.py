@@ -119,7 +119,7 @@ def run(
 
 @on_one_thread
 def take_part(pool: Pool, stopping: Stopping) -> None:
-    """Do a worker's part of a run; everything it has to know comes from the first rank."""
+    """Do a worker's part of a run; all information comes from the first rank."""
 
     def unknown() -> Study:
         raise AssertionError("a worker is not the first rank")
@@ -180,11 +180,11 @@ def _say_nothing(text: str) -> None:
 
 
 def _run(request: RunRequest, pool: Pool) -> Summary:
-    """Run the study, again on those that are left where ranks are lost on the way."""
+    """Run the study; where ranks are lost, the remaining ones continue."""
     began, compiled, n_rank = time.monotonic(), seconds_compiling(), pool.size
 
     def elapsed() -> float:
-        """Seconds but for those of compilations: of the rank with most, which the others waited for."""
+        """Seconds without compilation, by the rank that compiled longest, for which the others waited."""
         compiling = max(pool.gather(seconds_compiling() - compiled))
         return max(time.monotonic() - began - compiling, 0.0)
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rubhpc.running.job import Job
     from rubhpc.storage.ledger import Ledger
 
-_REASONS = 100  # failed cases a summary names, at most
+_REASONS = 100  # most failed cases named in a summary
 
 
 def finish_run(job: Job, request: RunRequest, computed: int, seconds: float) -> Summary:
@@ -37,10 +37,11 @@ def finish_run(job: Job, request: RunRequest, computed: int, seconds: float) -> 
 
 
 def finish_part(job: Job, request: RunRequest, computed: int, seconds: float) -> Summary:
-    """Give up the part, pack the journals, and what a whole run packs where no part is left to be computed.
+    """Release the part and pack the journals; if it is the last part, pack as after a whole run.
 
-    The part is given up first: of parts that end at the same time, the last finds no other at work. Where
-    the store is not to be had (a whole run has begun, or this one is to stop at once) that is left to others.
+    The part is released first, so that the last of several parts that end together finds no other at work.
+    Where the store is not available (a whole run has begun, or this one must stop at once) packing is left to
+    others.
     """
     part, store = job.part, Store(job.study.output)
     assert part is not None
@@ -69,7 +70,7 @@ def finish_part(job: Job, request: RunRequest, computed: int, seconds: float) ->
 
 
 def _clean_up(store: Store, ledger: Ledger) -> None:
-    """Remove what was to stop the run, and the records of cases that have an outcome."""
+    """Remove stop requests, and the in-progress records of cases that have an outcome."""
     with disk_errors(store.path):
         remove(store.path / "STOP")
         forget(store.in_progress_directory, ledger.status != MISSING)

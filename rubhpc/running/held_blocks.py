@@ -1,4 +1,4 @@
-"""Blocks between computing and the store: read, held back while more of their cases may come, written."""
+"""Blocks between computation and the store: read, held back while more of their cases may follow, written."""
 
 from __future__ import annotations
 
@@ -46,9 +46,9 @@ class HeldBlocks:
     patience : float
         Seconds for which finished blocks may be held back, since more of their cases may come.
     entered : list of Entry
-        Of a refined map, what this rank has computed of whole blocks, or found damaged.
+        Of a refined map: cases of whole blocks that this rank has computed or found damaged.
     pieces : Pieces
-        What it has computed of blocks that it shares with other ranks.
+        Its results in blocks that it shares with other ranks.
     """
 
     def __init__(self, store: Store, ledger: Ledger, journal: Journal, *, is_refined: bool) -> None:
@@ -69,7 +69,7 @@ class HeldBlocks:
     def read(
         self, start: Start, flat: NDArray[np.int64], wanted: NDArray[np.bool_]
     ) -> tuple[Arrays, NDArray[np.bool_]]:
-        """Arrays of a block with the cases that are there already, and which of those are damaged.
+        """Arrays of a block with its stored cases, and which of these are damaged.
 
         Parameters
         ----------
@@ -140,9 +140,9 @@ class HeldBlocks:
         self.store()
 
     def sync(self) -> None:
-        """Return once what has been stored would survive a power failure, the arrays before their lines.
+        """Sync to the disk what has been stored, arrays before their journal lines.
 
-        A process that is killed loses nothing without it.
+        It is needed for power failures only, not for killed processes.
         """
         began = time.monotonic()
         with disk_errors(self._store.path):

@@ -35,7 +35,7 @@ class InitialState:
     state : (n_degree,) or None
         Of the case before, packed; None at rest.
     note : str
-        What the case's line says of it; "" where all is as the study has it.
+        Remark in the journal line of the case; "" if it starts as the study states.
     """
 
     state: NDArray[np.float64] | None = None
@@ -82,12 +82,12 @@ class InitialStates:
         return InitialState(note=rest_note(self._grid, index, status))
 
     def remember(self, flat: NDArray[np.int64], data: Arrays) -> None:
-        """Keep where the cases of a block have ended, and forget those of the block before."""
+        """Keep the final states of a block, and drop those of the block before."""
         if FINAL_STATE in data:
             self._held = dict(zip(flat.tolist(), data[FINAL_STATE], strict=True))
 
     def _fetch(self, flat: int) -> None:
-        """See that it is known where a case has ended that is done."""
+        """Load the final state of a case that is done."""
         if flat in self._held:
             return
         start = self._store.start_of(flat)

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Job:
-    """What the first rank sends to the others.
+    """Job of a run, sent by the first rank to the others.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Job:
     share : (n_case,) bool
         Cases of the part; all without one.
     missing : (n_case,) bool
-        Cases of it to be computed, but for the suspect ones; of a refined map those that are known so far.
+        Cases of it to be computed, without suspect ones; of a refined map those known so far.
     pending : (n,) int
         Positions in `CaseGrid.sequences()` of those that hold one.
     suspect : dict
@@ -193,7 +193,7 @@ def _warm_up(grid: CaseGrid, block: Block, stopping: Stopping) -> None:
         if stopping.look():
             raise Stopped
 
-    with suppress(Exception):  # what is wrong with these cases will be their reason to fail
+    with suppress(Exception):  # an error will be reported as the reason of these cases
         for case in grid.with_each_law(block.start):
             compile_kernels(
                 set_up_for_kernels(grid.study, case),

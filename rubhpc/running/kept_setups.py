@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rubhpc.study.study import Study
 
 MOST_SETUPS = 4  # a block shares one, and neighbours often do
-MOST_BYTES = 2**30  # of contact modes beside those of the case under way; those of 32 stators fill a gigabyte
+MOST_BYTES = 2**30  # of contact modes, without those of the current case; those of 32 stators fill a gigabyte
 
 
 class KeptSetups:
@@ -28,7 +28,7 @@ class KeptSetups:
         self._kept: OrderedDict[tuple[int, float, Contact, float], tuple[Rig, Setup]] = OrderedDict()
 
     def of(self, case: Case) -> Setup:
-        """What the cases of this rig, speed and contact share."""
+        """Set-up that the cases of this rig, speed and contact share."""
         key = (
             id(case.rig),
             case.speed,

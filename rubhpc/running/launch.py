@@ -34,7 +34,7 @@ class Launch(NamedTuple):
 _PARENT = os.getppid()
 _moved: list[Launch] = []
 _watching: list[bool] = []
-FIRST_SPEAKS = 1.0  # s, for which the other ranks leave the word to the first: a launcher ends all with one
+FIRST_SPEAKS = 1.0  # s, for which the other ranks let the first report: a launcher ends all with one
 _LOOK = 0.5  # s between looks at whether the launcher still lives
 _FEW = 32
 _PR_SET_PDEATHSIG = 1  # from Linux's prctl.h
@@ -52,7 +52,7 @@ def launch() -> Launch:
 
 
 def move_to(rank: int, size: int, *, has_lost: bool = False) -> None:
-    """Have `launch` return this place from now on; where ranks were lost, another may be the first."""
+    """Make `launch` return this place from now on; where ranks were lost, another may be the first."""
     _moved.append(launch()._replace(rank=rank, size=size, has_lost=has_lost))
 
 

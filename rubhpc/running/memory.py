@@ -7,11 +7,11 @@ from pathlib import Path
 
 _STATUS = Path("/proc/self/status")
 _MACHINE = Path("/proc/meminfo")
-_PEAK = "VmHWM:"  # of the program itself: what getrusage says begins with that of the process that started it
+_PEAK = "VmHWM:"  # of the program itself: getrusage includes the process that started it
 
 
 def peak_memory() -> float:
-    """Most memory that this process has held so far, bytes."""
+    """Peak memory of this process so far, bytes."""
     try:
         return 1024.0 * float(_STATUS.read_text().split(_PEAK)[1].split()[0])
     except (OSError, IndexError, ValueError):  # no Linux
@@ -21,7 +21,7 @@ def peak_memory() -> float:
 
 
 def free_memory() -> float:
-    """Bytes that may still be asked for on this machine; 0 where that is unknown."""
+    """Free memory of this machine, bytes; 0 where that is unknown."""
     try:
         return 1024.0 * float(_MACHINE.read_text().split("MemAvailable:")[1].split()[0])
     except (OSError, IndexError, ValueError):

@@ -30,13 +30,13 @@ if TYPE_CHECKING:
     from rubhpc.study.cases import Case, CaseGrid
     from rubhpc.study.contact_keys import Contact
 
-_LONG = 0.25  # s: cases that take longer are run part by part, and left where there is no time for the whole
-_MOST_KEPT, _OF_FREE = 2 * MOST_BYTES, 0.25  # of cases that may be finished, and of the memory that is free
-_LONGEST_BRANCHES = 20.0  # s, after which the branches of a case are followed no further
+_LONG = 0.25  # s: longer cases are run part by part, and stopped where there is no time for the whole
+_MOST_KEPT, _OF_FREE = 2 * MOST_BYTES, 0.25  # bytes of unfinished cases, and share of free memory
+_LONGEST_BRANCHES = 20.0  # s, after which the branches of a case are stopped
 
 
 class Pace(NamedTuple):
-    """What a run spends its time on, seconds.
+    """Parts of the time of a run, seconds.
 
     `step` is that of a predicted step, `rig` of assembling a rig, `speed` of preparing it at a speed with the
     modes, `friction` of solving the contact modes of a friction, `block` of writing a block, `case` of a case
@@ -59,23 +59,23 @@ class Pilots:
     was_cut : bool
         The branches of the last one were not followed to their ends.
     covered : float
-        Share of the range of the parameter that they had come by.
+        Share of the range of the parameter that they had covered.
     loading : float
         Processor seconds in which kernels were loaded.
     shortened : dict
-        What cases that were not run whole will take, by their indices.
+        Forecasts of cases that were not run whole, by their indices.
     alike : dict
         The other case that was timed after a case in a ring, by their indices.
     irregular : set of tuple of int
-        Those of them that still met new contact modes where they were left.
+        Those of them that still met new contact modes where they were stopped.
     ended : set of tuple of int
-        Those of them that went on to their ends.
+        Those of them that were run to their ends later.
     arrays : dict
         Signals and the like of the latest case that was run, by name.
     modes : dict
         Bytes of contact modes that cases of one set-up and friction held in a ring, by the index of the last.
     memory : float
-        Bytes that this process held at most before the first case, its kernels loaded.
+        Peak memory of this process before the first case, with its kernels loaded, bytes.
     """
 
     def __init__(self, grid: CaseGrid) -> None:
@@ -85,11 +85,11 @@ class Pilots:
         # Of cases that were run whole after another one: what shared contact modes and the rest took, s.
         self._taken: dict[tuple[int, ...], tuple[float, float]] = {}
         self._stopwatch = Stopwatch()
-        self._followed: list[tuple[int, float]] = []  # of whole cases: revolutions behind the record, and s
+        self._followed: list[tuple[int, float]] = []  # of whole cases: revolutions after the record, and s
         self._kept: dict[tuple[int, ...], FollowedCase] = {}  # that may be finished
         self._spent: dict[tuple[int, ...], float] = {}  # s, on cases that were shortened
         self._first: dict[tuple[int, ...], tuple[Forecast, float]] = {}  # what was predicted then, and spent
-        self._usual = 0.0  # revolutions behind the record
+        self._usual = 0.0  # revolutions after the record
         self._longest = 0.0  # s, of the longest case, as far as it was run
         self.was_cut, self.covered = False, 0.0
         self.loading = 0.0
@@ -103,29 +103,29 @@ class Pilots:
 
     @property
     def compiling(self) -> float:
-        """Processor seconds in which kernels were compiled that no cache held."""
+        """Processor seconds of compilations that were not in a cache."""
         return self._stopwatch.compiling
 
     @property
     def n_behind(self) -> float:
-        """Revolutions likely to be followed behind the record of a case that takes long.
+        """Likely revolutions after the record of a long case.
 
-        The mean of the cases that were run whole, by their times, and of what is usual, which counts as much
-        as the longest case so far: the tangent of a whip is often carried on where a cheap one is not.
+        The mean over the cases that were run whole, weighted by their times, and the default with the weight
+        of the longest case: the tangent of a whip often needs more revolutions than that of a short case.
         """
         followed = sum(n * seconds for n, seconds in self._followed)
         whole = sum(seconds for _, seconds in self._followed)
         return (followed + self._usual * self._longest) / (whole + self._longest) if whole else self._usual
 
     def foreseen(self, index: tuple[int, ...]) -> float:
-        """Time of a case that was shortened, s, from what all cases so far have shown."""
+        """Predicted time of a shortened case, s, from all cases so far."""
         return self.shortened[index].whole(self.n_behind)
 
     def pace(self, index: tuple[int, ...], steps: float, limit: float) -> Pace:
         """Times of a case and of its preparation; shortened where the whole takes longer than `limit`, s.
 
-        With several stators each case meets other sets of contacts. Another case of its speed and friction is
-        run after it: the modes that this one did not have to solve are those that such cases share.
+        With several stators each case meets other sets of contacts. Another case of the same speed and
+        friction is run after it: the modes that it need not solve are those that such cases share.
         """
         case = self._grid.case(index)
         if self._study.branch is not None:
@@ -153,7 +153,7 @@ class Pilots:
         limit = limit if alike is None else 0.5 * limit
         is_short = max(self._paces, default=math.nan) * steps < _LONG and not is_ring(setup)
         if isinstance(recording.transient, str) or recording.lyapunov or is_short:
-            followed.run_at_once()  # nobody knows when a transient ends, but by trying
+            followed.run_at_once()  # the end of a transient is found only by running it
         else:
             followed.follow(steps, self.n_behind, limit)
         self._take_in(followed)
@@ -174,7 +174,7 @@ class Pilots:
         return shared, rest
 
     def _take_in(self, followed: FollowedCase) -> None:
-        """Take in what a case has shown."""
+        """Use the results of a case."""
         self._longest = max(self._longest, followed.seconds)
         if followed.is_whole:
             self._followed.append((followed.n_behind, followed.seconds))
@@ -182,7 +182,7 @@ class Pilots:
             self.arrays = arrays_of(followed.record)
 
     def _left(self, case: Case, followed: FollowedCase) -> float:
-        """Take in a case that was not run whole; returns how long it will take, s."""
+        """Use a case that was not run whole; returns its predicted time, s."""
         self._foresee(case.index, followed)
         self._first[case.index] = self.shortened[case.index], followed.seconds
         self._kept[case.index] = followed
@@ -243,24 +243,24 @@ class Pilots:
         return max(0.0, middle - began - prepared), prepared, setup
 
     def spent(self, index: tuple[int, ...]) -> float:
-        """What a shortened case has taken so far, s."""
+        """Time of a shortened case so far, s."""
         return self._spent[index]
 
     def first(self, index: tuple[int, ...]) -> tuple[float, float]:
-        """What a case had taken when it was shortened, and what was predicted to come then, s."""
+        """Time of a case when it was shortened, and the predicted rest, s."""
         forecast, spent = self._first[index]
         return spent, forecast.whole(self.n_behind) - spent
 
     def left(self, index: tuple[int, ...]) -> float:
-        """Time that it takes to finish a shortened case, s; nothing where it is kept no longer."""
+        """Predicted time to finish a shortened case, s; 0 where it is no longer kept."""
         return self.foreseen(index) - self._kept[index].seconds if index in self._kept else 0.0
 
     def seconds_of_next(self, index: tuple[int, ...]) -> float:
-        """About what the next part of a shortened case takes, s."""
+        """Approximate time of the next part of a shortened case, s."""
         return self._kept[index].seconds_of_next
 
     def go_on(self, index: tuple[int, ...], limit: float) -> bool:
-        """Run the next part of a shortened case; whether that came to its end within `limit` s."""
+        """Run the next part of a shortened case; returns whether it ended within `limit` s."""
         followed = self._kept[index]
         is_done = followed.go_on(limit)
         self._note_modes(index, followed.setup)
@@ -275,9 +275,8 @@ class Pilots:
     def _branches(self, case: Case) -> float:
         """Time of the branches of a case; where they were not followed to their ends it is predicted.
 
-        The first branch goes from where it begins to one end of the range, then to the other. What it has
-        come by when it `was_cut` is taken for a sample of the whole range; that it turns, and that others
-        follow, is not predicted.
+        The first branch runs from its start to one end of the range, then to the other. The part covered when
+        it `was_cut` is a sample of the whole range. Folds and further branches are not predicted.
         """
         study = self._study
         branch = study.branch
@@ -298,14 +297,14 @@ class Pilots:
 
 
 def bytes_of_modes(setup: Setup) -> int:
-    """Memory that contact modes of a ring hold; that of one pair is little."""
+    """Memory of the contact modes of a ring, bytes; that of one pair is negligible."""
     if not (is_ring(setup) and isinstance(setup, ModalSetup)):
         return 0
     return sum(setup.n_byte.values()) + setup.n_byte_of_parts
 
 
 def arrays_of(record: Record | RunUpRecord) -> dict[str, NDArray[Any]]:
-    """All that a store keeps of a record, by name."""
+    """All arrays that a store keeps of a record, by name."""
     if isinstance(record, RunUpRecord):
         return record.arrays
     return {**record.signals, **record.spectra, **record.sections, FINAL_STATE: record.final.packed()}

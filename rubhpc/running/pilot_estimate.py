@@ -1,4 +1,4 @@
-"""From the times of a few cases to that of all, and how far it may be off."""
+"""Estimate of the time of all cases from those of a few, with its error."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-_WITHIN = 0.95  # by Student's distribution: few cases rarely hold the longest, so that it is 0.8 to 0.95
+_WITHIN = 0.95  # by Student's distribution; in fact 0.8 to 0.95, as few cases rarely include the longest
 _FEWEST_FREE = 3  # degrees of freedom of that distribution, at least
 _UPWARD = 1.3  # reach of a range upwards over that downwards: long cases are rare, and missed more often
 _OFF = 0.25  # standard deviation of a time predicted from part of a case, as a share of it (18 cases, 4 laws)
-_OFF_IRREGULAR = 0.4  # the same where its motion still met contact modes: it may settle, or meet yet more
+_OFF_IRREGULAR = 0.4  # the same where its motion still met contact modes: it may settle or meet more
 
 
 @dataclass
@@ -27,17 +27,17 @@ class Sample:
     Attributes
     ----------
     n_case, all_steps : float
-        Of all that is missing: cases and predicted steps.
+        Missing cases and their predicted steps.
     steps, probability, seconds : list of float
         Of each case: predicted steps, probability that a draw picks it, and the time it takes.
     is_whole : list of bool
         Whether it was run to its end; the time of others is predicted from a part.
     spent : list of float
-        What that part took, s.
+        Time of that part, s.
     is_irregular : list of bool
         Whether its motion still met contact modes where that part ended.
     checked : list of (float, float)
-        Of cases that went on to their ends: what a part had predicted to come, and what came, s.
+        Of cases that were run to their ends later: predicted and actual time of the rest, s.
     """
 
     n_case: int
@@ -60,7 +60,7 @@ class Sample:
         spent: float = 0.0,
         is_irregular: bool = False,
     ) -> None:
-        """Take in a case."""
+        """Add a case."""
         self.steps.append(steps)
         self.probability.append(probability)
         self.seconds.append(seconds)
@@ -75,7 +75,7 @@ class Sample:
 
     @property
     def correction(self) -> float:
-        """What is to come of a case by a part of it is multiplied with this: a ratio, drawn towards 1."""
+        """Factor for the predicted rest of a case: a ratio, shrunk towards 1."""
         if not self.checked:
             return 1.0
         foreseen, taken = np.sum(self.checked, axis=0)
@@ -83,13 +83,12 @@ class Sample:
         return float((taken + usual) / (foreseen + usual))
 
     def estimate(self) -> tuple[float, float, float]:
-        """Seconds of a case whatever its steps, seconds a step, and the standard error of the sum, s.
+        """Seconds per case, seconds per step, and the standard error of the sum over all cases, s.
 
-        Of all cases: what was timed, and for the others `a + b steps`, fitted with weights inverse to the
-        probabilities, so that the residuals of all cases add up to nothing on average (the generalised
-        regression estimator: C.-E. Sarndal et al., Model Assisted Survey Sampling, 1992, ch. 6).
-        Neither a nor b is negative.
-        The error is NaN where one of several cases was timed.
+        The sum has the times of timed cases, and for the others `a + b steps`, fitted with weights inverse to
+        the probabilities, so that the residuals of all cases add up to zero on average (the generalised
+        regression estimator: C.-E. Sarndal et al., Model Assisted Survey Sampling, 1992, ch. 6). Neither a
+        nor b is negative. The error is NaN where one of several cases was timed.
         """
         n = len(self.steps)
         steps = np.array(self.steps)
@@ -134,8 +133,8 @@ def _line(steps: Floats, seconds: Floats, weight: Floats) -> tuple[float, float]
 def within(seconds: float, error: float, n: int, known: float = 0.0) -> tuple[float, float]:
     """Range of the time, of eight to nine plans in ten: Student's distribution of its logarithm, n cases.
 
-    It reaches further up than down. Of three cases or fewer it is that of four, so that it does not reach
-    beyond what anyone can use, and what is `known`, s, was timed: all will not take less.
+    It reaches further up than down. For up to three cases it is that of four, so that the range stays useful.
+    The time `known`, s, is its lower limit.
     """
     from scipy.special import stdtrit
 

@@ -26,22 +26,22 @@ if TYPE_CHECKING:
     from rubhpc.study.cases import Block, CaseGrid
 
 _MOST_PILOTS, _FEW_PILOTS, _FEW_BRANCHED = 64, 6, 2  # cases; timed even if slow, and of a branch study
-_ENOUGH, _MOST = 3.0, 15.0  # processor seconds after which no more are begun: where they agree, and at all
+_ENOUGH, _MOST = 3.0, 15.0  # processor seconds after which no more are begun: if they agree, and always
 _AGREED = 0.25  # standard error of the mean pace, as a share of it, where cases agree
-_LONGEST = 75.0  # s, in which cases that were shortened are run whole, together
+_LONGEST = 75.0  # s, total for running shortened cases whole
 _OF_A_BRANCH = 0.3  # standard error, as a share, of a time predicted from part of the first branch
-_LEAST, _SHARE = 15.0, 0.4  # s that all may take, or that share of the time predicted where it is more
+_LEAST, _SHARE = 15.0, 0.4  # s for all cases, or this share of the predicted time where it is more
 _HALF = 0.5  # of the time predicted, or `_LEAST`, for cases that go on, at least
 _LEAST_EACH = 1.0  # s, for each case
-_SMALL = 24  # cases: of a study of no more all are begun
-_FEWEST = 3  # cases, timed in any case
+_SMALL = 24  # cases: in studies of up to so many all are begun
+_FEWEST = 3  # cases that are always timed
 # Positions that spread evenly over a square, however many (R. Kronecker; steps of M. Roberts' R2 sequence).
 _AMONG_BLOCKS, _WITHIN_BLOCK = 0.7548776662466927, 0.5698402909980532
 
 
 @dataclass(frozen=True, kw_only=True)
 class Timing:
-    """What pilot cases have shown.
+    """Results of the pilot cases.
 
     Attributes
     ----------
@@ -53,12 +53,12 @@ class Timing:
         Standard error of the time of all cases, as a share of it: 0 where all were timed, NaN where one of
         several was.
     known : float
-        Seconds that cases took, whole or as far as they were run.
+        Seconds of cases, whole or in part.
     is_bound : bool
-        Whether a case took longer than is waited for, so that the pace is a lower bound.
+        Whether a case was stopped by the limit, so that the pace is a lower bound.
     seconds : float
-        Processor time that it took, with lines of a refined map, but for what a run takes as well: kernels
-        that are loaded.
+        Processor time of the timing, including lines of a refined map, without loading kernels, which a run
+        needs too.
     modes : tuple of float
         Bytes of contact modes that cases of one set-up and friction held in a ring, for each that was timed.
     memory : float
@@ -94,7 +94,7 @@ def time_pilots(
     missing: NDArray[np.bool_],
     say: Callable[[str], None] = lambda _: None,
 ) -> Timing:
-    """Time cases of the blocks that are missing, until enough time has gone by; `say` is given their number.
+    """Time cases of the missing blocks until enough time has passed; `say` receives their number.
 
     A case is picked with a probability that is half proportional to its predicted steps and half the same
     for all; the cases spread evenly over the blocks and over the cases of a block.
@@ -121,7 +121,7 @@ def time_pilots(
 
     for k, (index, steps, probability) in enumerate(_picked(blocks, missing)):
         if k >= few and spent() > (_ENOUGH if _spread(sample) <= _AGREED else _MOST):
-            break  # a few rubs among many free motions take most of the time of some studies
+            break  # in some studies a few rubs among many free motions take most of the time
         if k >= min(few, _FEWEST) and allowed() <= 0.0:
             break
         say(f"timing cases: {len(paces)} so far, {max(spent(), 0.0):.0f} s of processor time")
@@ -144,7 +144,7 @@ def time_pilots(
                     spent=pilots.spent(one) if one in pilots.shortened else 0.0,
                     is_irregular=one in pilots.irregular,
                 )
-        except Exception as error:  # whatever is wrong with the case: the others are timed all the same
+        except Exception as error:  # the other cases are timed in spite of an error
             where = manifest.name_case(int(np.ravel_multi_index(index, grid.shape)))
             failures.append(f"{where}: {type(error).__name__}: {' '.join(str(error).split())}")
         if pilots.was_cut:  # another would take as long
@@ -175,12 +175,12 @@ def time_pilots(
 
 
 def _finish(pilots: Pilots, picked: list[tuple[int, ...]], sample: Sample, seconds: float) -> None:
-    """Go on with cases that were shortened, part by part, for some seconds together.
+    """Continue shortened cases, part by part, for some seconds in total.
 
-    What such a case comes to is hardly known from its beginning: more and more sets of contacts, a tangent
-    that is carried on and on. The next part is always that of the case of which most is to come. A record
-    that has room is run too: it is not known whether anything is followed behind it. Cases that are not
-    finished are predicted again, and corrected by what the others came to.
+    The beginning of such a case says little about its rest: it may meet more sets of contacts, or need many
+    revolutions after the record. The case with the largest predicted rest is always continued next. Records
+    that fit are run too, because revolutions after them are not known. Unfinished cases are predicted again,
+    and corrected by the others.
     """
     shortened = {index: k for k, index in enumerate(picked) if index in pilots.shortened}
     end = time.process_time() + min(seconds, _LONGEST)

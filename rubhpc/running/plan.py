@@ -1,4 +1,4 @@
-"""The cost of a study and what of it is done: cases are counted, and a few short pilot cases are timed."""
+"""The cost and progress of a study: cases are counted, and a few pilot cases are timed."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ if TYPE_CHECKING:
 
 _LINE = 400  # bytes of a case in a journal, about, for one stator
 _OWN_COORDINATES = 9  # of the dimensions after the axes, the stators and the settings
-_AT_EDGES = 1.1  # cases that a refined map computes over all cases, seconds a step, about
+_AT_EDGES = 1.1  # seconds per step of cases that a refined map computes, over that of all cases, about
 _AGREED = 0.03  # standard error of the time, as a share of it, up to which no range is given
-_FEW = 3  # cases, which may all lack what most of the time is spent on
+_FEW = 3  # cases, which may all miss the main cost
 _ROOM = 1.15  # memory for contact modes over what their tables and parts hold (1.04 to 1.12, rings of 16)
-_LEDGERS = 2  # times that measures of all cases are held while they are packed, about
+_LEDGERS = 2  # copies of the measures of all cases while they are packed, about
 _PRIVATE_FILES = 8  # manifests, journals, records of runs
 
 
@@ -65,10 +65,10 @@ class Plan:
     core_hours : float
         For what is missing, from the pilot cases; NaN where they failed.
     start_up : float
-        Processor seconds that each process takes to start and to end, about, which are not in `core_hours`;
-        0 where that is unknown.
+        Approximate processor seconds of the start and end of each process, which are not in `core_hours`; 0
+        where that is unknown.
     memory : float
-        Bytes that a process of the run holds at most, about; 0 where no case was timed.
+        Approximate peak memory of a process, bytes; 0 where no case was timed.
     timing : Timing
         What the pilot cases have shown.
     warnings : tuple of str
@@ -112,7 +112,7 @@ class Plan:
 
     @property
     def _timed(self) -> list[str]:
-        """How many cases were timed, and how well they stand for the rest."""
+        """Number of timed cases, and how well they represent the others."""
         timing = self.timing
         if not timing.n_pilot:
             return []
@@ -127,7 +127,7 @@ class Plan:
 
     @property
     def _range(self) -> str:
-        """From and to where the time lies, for people; "" where cases agree, or nobody knows."""
+        """Range of the time as text; "" where cases agree or nothing is known."""
         timing, seconds = self.timing, 3600.0 * self.core_hours
         if timing.is_bound or not _AGREED * self._whole < timing.spread * seconds < math.inf:
             return ""
@@ -147,7 +147,7 @@ class Plan:
         return f"in {sweeps}: more ranks than that would be idle"
 
     def text(self) -> str:
-        """The plan for people, a few lines."""
+        """The plan as a few lines of text."""
         n_case = math.prod(self.shape.values())
         sizes = " x ".join(f"{n} {name}" for name, n in self.shape.items())
         cost = (
@@ -193,7 +193,7 @@ class Plan:
 def make_plan(study: Study, part: str | None = None, say: Callable[[str], None] = lambda _: None) -> Plan:
     """Count, look into the store if there is one, and time pilot cases; writes nothing.
 
-    With a part, as "3/64", what is left of it is counted and timed. `say` is given what is done meanwhile.
+    With a part, such as "3/64", its missing cases are counted and timed. `say` receives the progress.
 
     Raises
     ------

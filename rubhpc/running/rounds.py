@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     Arrays = dict[str, NDArray[Any]]
     Lines = list[tuple[int, int, int]]  # flat index, status and checksum of cases
 
-_ALONE = 8  # cases a rank that are handed out one by one at the end of a round
+_ALONE = 8  # cases per rank that are claimed one by one at the end of a round
 
 
 class Unit(NamedTuple):
@@ -34,7 +34,7 @@ class Unit(NamedTuple):
 
 
 class News(NamedTuple):
-    """What a rank gives to the others at the end of a round.
+    """Results that a rank sends to the others at the end of a round.
 
     Attributes
     ----------
@@ -43,9 +43,9 @@ class News(NamedTuple):
     pieces : dict
         Block -> cases of it that are held back, of this round and those before.
     n_claim : int
-        Units that were claimed, the one beyond the last included.
+        Number of claims, including the one after the last unit.
     is_due : bool
-        Whether what is held back has been so for long.
+        Whether results have been held back for long.
     is_over : bool
         Whether all are to end.
     """
@@ -71,7 +71,7 @@ class Blocks:
         self._found = [found[i] for i in order.tolist()]
 
     def units(self, missing: NDArray[np.bool_], n_rank: int) -> list[Unit]:
-        """Return what ranks claim of missing cases, (n_case,): blocks with most of them first, then cases."""
+        """Return the units of missing cases, (n_case,): blocks with most of them first, then single cases."""
         flat = np.flatnonzero(missing)
         index = np.unravel_index(flat, self._shape)
         numbers = np.ravel_multi_index(

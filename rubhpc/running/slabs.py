@@ -1,4 +1,4 @@
-"""Slabs of a refined map: boxes as long as the refined axes, none of which decides anything in another.
+"""Slabs of a refined map: independent boxes that extend over the refined axes.
 
 A map over speed, clearance and friction that is refined along the last two has one for each speed. Whoever
 computes a slab goes through all its levels without waiting for others, with one set-up for all of them.
@@ -58,7 +58,7 @@ def find_slabs(blocks: list[Block], shape: tuple[int, ...], refined: tuple[int, 
 
 
 def work_through(slab: Slab, refinement: Refinement, worker: Worker) -> bool:
-    """Compute what is missing of a slab, level by level; whether its end was reached.
+    """Compute the missing cases of a slab, level by level; returns whether its end was reached.
 
     Parameters
     ----------

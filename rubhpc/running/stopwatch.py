@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 _Result = TypeVar("_Result")
 
-_LEAST = 1e-6  # s, so that a time may be divided by
+_LEAST = 1e-6  # s, least time, so that times are not zero
 
 
 class Enough(Exception):  # noqa: N818 - no error: what cuts off a run
@@ -34,9 +34,9 @@ class Stopwatch:
     def timed(
         self, run: Callable[[Callable[[], None]], _Result], most: float
     ) -> tuple[float, _Result | None]:
-        """Processor time of a run, s, and what it returns: None where it was cut off after `most` s.
+        """Processor time of a run, s, and its result: None where it was stopped after `most` s.
 
-        The run is given what it has to call now and then.
+        The run receives a function that it must call regularly.
         """
         while True:
             compiled, began = seconds_compiling(), time.process_time()
@@ -51,7 +51,7 @@ class Stopwatch:
 
 
 def _limit(seconds: float) -> Callable[[], None]:
-    """What ends a run after so much processor time from now."""
+    """Check that ends a run after so much processor time from now."""
     end = time.process_time() + seconds
 
     def check() -> None:

@@ -1,4 +1,4 @@
-"""How long a case of changing speed takes, for `rubhpc plan`: from parts of it, which stand for the whole."""
+"""Time of a case of changing speed for `rubhpc plan`, from representative parts."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _WINDOWS = 4  # parts of a law
 
 
 def parts(law: SpeedLaw | DriveLaw, turns: int) -> list[SpeedLaw | DriveLaw]:
-    """So many revolutions of a changing speed: the first ones of a drive, else parts spread over the law."""
+    """Parts with so many revolutions: the first ones of a drive, else parts spread over the law."""
     if isinstance(law, DriveLaw):
         return [replace(law, n_revolution=turns)]
     n = law.n_revolution
@@ -49,7 +49,7 @@ def _between(law: SpeedLaw, first: int, last: int) -> SpeedLaw:
 def time_run_up(
     study: Study, case: Case, setup: Setup, law: SpeedLaw | DriveLaw, stopwatch: Stopwatch
 ) -> tuple[float, RunUpRecord]:
-    """Time of a run-up or drive, s, which takes most of it for setting up its pieces, and a record of it."""
+    """Time of a run-up or drive, s, mainly for the set-up of its pieces, and a record of it."""
     n, turns = law.n_revolution, min(law.n_revolution, _FIRST_TURNS)
     while True:
         taken = 0.0

@@ -49,7 +49,7 @@ class _OverTime(Exception):  # noqa: N818 - becomes the reason of a failed case
 
 @dataclass
 class Worker:
-    """What a rank needs to compute blocks.
+    """Computes blocks on a rank.
 
     Attributes
     ----------
@@ -60,11 +60,11 @@ class Worker:
     attend : callable
         Called several times a second while a case is computed.
     held : HeldBlocks
-        What it has computed that is not stored yet.
+        Results that are not stored yet.
     say : callable
-        Called with what a case that takes long has come to.
+        Called with the progress of a long case.
     is_wanted_elsewhere : callable
-        Asked after every case whether to store what there is of the block and leave the rest of it.
+        Called after every case; true: store what is done of the block and leave the rest.
     """
 
     grid: CaseGrid
@@ -91,7 +91,7 @@ class Worker:
     def work(self, block: Block, *, is_shared: bool = False) -> None:
         """Compute, store and journal what is missing of a block; what is finished when a stop comes is kept.
 
-        Of a block that is shared with other ranks nothing is read, and what is computed is a piece (`held`).
+        A block that is shared with other ranks is not read, and results are pieces (`held`).
 
         In a continuation a case starts from the final state of its predecessor, in this block or another.
 
@@ -150,7 +150,7 @@ class Worker:
 
     @property
     def _pace(self) -> float:
-        """Seconds a predicted step has taken on this rank so far; nothing is known before the first case."""
+        """Mean seconds per predicted step on this rank so far; unknown before the first case."""
         return self._seconds / self._cost if self._cost else 0.0
 
     def _repair(self, start: tuple[int, ...]) -> None:
@@ -158,7 +158,7 @@ class Worker:
         self.work(next(block for block in self.grid.blocks() if block.start == start))
 
     def _enter(self, case: Case, flat: int, data: Arrays, i_case: int, start: InitialState) -> Entry:
-        """Compute a case and put its arrays in the block's; what goes wrong in it is its reason to fail."""
+        """Compute a case and put its arrays into those of the block; an error becomes its reason to fail."""
         self.watch.begin(flat, case.id)
         try:
             record = self._compute(case, start)

@@ -155,7 +155,7 @@ class Parent(_Shared):
                 connection.send((rank, self.size))
 
     def stop(self) -> None:
-        """Have the workers stop as on a signal of their own; safe within a handler of signals."""
+        """Stop the workers as by a signal; safe within a signal handler."""
         for process, _ in self._workers:
             with suppress(ProcessLookupError):
                 process.send_signal(signal.SIGTERM)
