@@ -184,7 +184,7 @@ def histogram(
     others = [d for d in values.dims if d not in axes]
     rows = values.transpose(*others, *axes)
     table = rows.values.reshape(math.prod(rows.sizes[d] for d in others), -1)
-    # One bincount of (cell, bin) for all cells; outside the edges, or NaN, is a bin that is thrown away.
+    # One bincount of (cell, bin) for all cells; outside the edges, or NaN, is a bin that is dropped.
     n = edges.size - 1
     at = np.searchsorted(edges, table, side="right") - 1
     at[table == edges[-1]] = n - 1

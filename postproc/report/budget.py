@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _NEEDED = ("status", "validity")  # without which a page shows nothing
 _SHARE_OF_MEASURES = 0.5  # of the room for data, at most
-_PILOTS = 24  # cases that are packed to foresee the size of all
+_PILOTS = 24  # cases that are packed to estimate the size of all
 
 
 @dataclass

@@ -178,7 +178,7 @@ class Recording:
 
     @property
     def longest_transient(self) -> int:
-        """Revolutions thrown away at most."""
+        """Most revolutions that are discarded."""
         if isinstance(self.transient, str):
             return LONGEST_TRANSIENT if self.transient_limit is None else self.transient_limit
         return self.transient
