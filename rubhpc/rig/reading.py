@@ -92,23 +92,18 @@ def _packaged(path: Path) -> Rig:
     return build(Rig, read_toml(path), path.name)
 
 
-def with_key(rig: Rig, dotted: str, value: object) -> Rig:
-    """Return the rig with one key set, in SI units or as text with a unit.
+def with_keys(rig: Rig, values: object) -> Rig:
+    """Return the rig with the dotted keys of a mapping set, in SI units or as text with a unit.
 
-    "stator.youngs_modulus" sets it in all stators, "stator.1.angle" in the first. Keys that give the same in
-    another way are replaced: `kyy` splits a bearing's common `stiffness`, and `stiffness` replaces `kyy` and
-    `kzz`.
+    Only the result has to be valid. "stator.youngs_modulus" sets it in all stators, "stator.1.angle" in the
+    first. Keys with the same meaning are replaced: `kyy` splits a bearing's common `stiffness`, and
+    `stiffness` replaces `kyy` and `kzz`.
 
     Raises
     ------
     InputError
-        When there is no such key, or the rig with that value is invalid.
+        When the values are no mapping, there is no such key, or the rig with them is invalid.
     """
-    return with_keys(rig, {dotted: value})
-
-
-def with_keys(rig: Rig, values: object) -> Rig:
-    """Return the rig with the dotted keys of a mapping set at once; only the result has to be valid."""
     if not isinstance(values, Mapping):
         fix = 'give one such as {"stator.youngs_modulus": "30 GPa"}'
         raise InputError(f"overrides: {brief(values)} is not a dict; {fix}")

@@ -24,7 +24,7 @@ from rubhpc.fem.modes import modes
 from rubhpc.fem.response import first_lateral_frequency, steady_response
 from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.rig.parts import Torsion
-from rubhpc.rig.reading import rig_from_dict, with_key, with_keys
+from rubhpc.rig.reading import rig_from_dict, with_keys
 from rubhpc.study.cases import CaseGrid, identity_parts
 from rubhpc.study.study import Study, make_axis
 
@@ -224,14 +224,14 @@ def test_keys_of_a_matrix_rig_are_those_that_it_has():
     assert np.array_equal(changed.rotor.mass, rig.rotor.mass)
     for key in ("rotor.shaft.length", "rotor.mass", "stator.length", "rotor.damping.alpha"):
         with pytest.raises(InputError, match=rf"{key}: unknown key"):
-            with_key(rig, key, 1.0)
+            with_keys(rig, {key: 1.0})
     beam = Stator(
         node=1, radius=0.1, length=0.1, width=0.01, height=0.01, youngs_modulus=1e9, density=1e3, angle=1.0
     )
     mixed = replace(rig, stator=(*rig.stator, beam))
     with pytest.raises(InputError, match="unknown key"):
-        with_key(mixed, "stator.stiffness", 1.0)  # the beam has none
-    assert with_key(mixed, "stator.4.length", 0.2).stator[3].length == 0.2
+        with_keys(mixed, {"stator.stiffness": 1.0})  # the beam has none
+    assert with_keys(mixed, {"stator.4.length": 0.2}).stator[3].length == 0.2
 
 
 def test_rig_file_takes_lumped_stators_and_matrices(tmp_path):
@@ -278,9 +278,9 @@ def test_whirl_needs_no_tilt():
 def test_free_motion_is_found_where_contact_or_outputs_see_it():
     packaged = read_rig("mokhtar2017")
     assert find_rigid_body_mode(assemble(packaged)) == ""
-    free = with_key(packaged, "rotor.torsion.free", True)
+    free = with_keys(packaged, {"rotor.torsion.free": True})
     assert find_rigid_body_mode(assemble(free)) == "the rotor is free to turn (torsion)"
-    loose = with_key(packaged, "rotor.bearing.stiffness", 0.0)
+    loose = with_keys(packaged, {"rotor.bearing.stiffness": 0.0})
     assert find_rigid_body_mode(assemble(loose)) == "the rotor is free to move"
     unseen = rotor(np.eye(3), None, np.diag([1.0, 1.0, 0.0]), degrees=[*PLANE, (1, "u")], stators=[WALL])
     assert find_rigid_body_mode(assemble(unseen)) == ""
@@ -294,14 +294,14 @@ def test_free_motion_is_found_where_contact_or_outputs_see_it():
 def test_rotor_free_in_torsion_is_refused_with_the_fix_and_a_soft_drive_twists_alike():
     """Four revolutions: 0.01 N m/rad holds next to nothing of what friction turns back by then."""
     packaged = read_rig("mokhtar2017")
-    free = with_key(packaged, "rotor.torsion.free", True)
+    free = with_keys(packaged, {"rotor.torsion.free": True})
     given = {"speed": 150.0, "clearance": 1e-4, "friction": 0.2}
     axes = tuple(make_axis(name, value, free) for name, value in given.items())
     with pytest.raises(InputError, match=r"free to turn \(torsion\); give it a stiffness, however soft, or"):
         CaseGrid(Study(title="free", rig=free, axes=axes, output=Path("none.zarr")))
     case = given | {"transient": 0, "revolutions": 4}
     drifts = simulate(free, **case, method="central-difference", step="1 us")
-    soft = simulate(with_key(packaged, "rotor.torsion.stiffness", 0.01), **case)
+    soft = simulate(with_keys(packaged, {"rotor.torsion.stiffness": 0.01}), **case)
     assert np.ptp(drifts.torsion) > 5e-3
     assert soft.vertical == pytest.approx(drifts.vertical, abs=1e-4 * np.ptp(drifts.vertical))
     assert soft.torsion == pytest.approx(drifts.torsion, abs=5e-3 * np.ptp(drifts.torsion))

@@ -10,7 +10,7 @@ import pytest
 
 from rubhpc.errors import InputError
 from rubhpc.rig.parts import Bearing, Damping, Disc, Torsion
-from rubhpc.rig.reading import packaged_rigs, read_rig, rig_from_dict, with_key, with_keys
+from rubhpc.rig.reading import packaged_rigs, read_rig, rig_from_dict, with_keys
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +69,7 @@ def test_bearing_matrices():
     ],
 )
 def test_a_dotted_key_sets_what_it_names(rig, key, value, read):
-    assert np.all(read(with_key(rig, key, value)))
+    assert np.all(read(with_keys(rig, {key: value})))
     assert not np.all(read(rig))
 
 
@@ -99,43 +99,43 @@ def test_a_number_names_one_of_many(rig):
 )
 def test_an_unknown_key_is_refused_with_the_nearest(rig, key, fix):
     with pytest.raises(InputError) as refused:
-        with_key(rig, key, 1.0)
+        with_keys(rig, {key: 1.0})
     assert fix in str(refused.value)
 
 
 def test_setting_one_direction_of_a_bearing_leaves_the_other(rig):
-    bearing = with_key(rig, "rotor.bearing.1.kyy", 3e6).rotor.bearing
+    bearing = with_keys(rig, {"rotor.bearing.1.kyy": 3e6}).rotor.bearing
     assert bearing[0].stiffness_matrix == ((3e6, 0.0), (0.0, 1e6))
     assert bearing[1].stiffness_matrix == ((1e6, 0.0), (0.0, 1e6))
-    back = with_key(with_key(rig, "rotor.bearing.kyz", 5.0), "rotor.bearing.stiffness", 2e6)
+    back = with_keys(with_keys(rig, {"rotor.bearing.kyz": 5.0}), {"rotor.bearing.stiffness": 2e6})
     assert back.rotor.bearing[0].stiffness_matrix == ((2e6, 0.0), (0.0, 2e6))
 
 
 def test_setting_the_mass_of_a_disc_keeps_its_inertias_and_rim(rig):
-    before, after = rig.rotor.disc[0], with_key(rig, "rotor.disc.mass", "5 kg").rotor.disc[0]
+    before, after = rig.rotor.disc[0], with_keys(rig, {"rotor.disc.mass": "5 kg"}).rotor.disc[0]
     assert after.inertia == (5.0, *before.inertia[1:])
     assert after.diameter == before.diameter
 
 
 def test_ways_of_holding_torsion_replace_each_other(rig):
-    spring = with_key(rig, "rotor.torsion.stiffness", 100.0)
+    spring = with_keys(rig, {"rotor.torsion.stiffness": 100.0})
     assert spring.rotor.torsion == Torsion(stiffness=100.0, node=1)
-    assert with_key(spring, "rotor.torsion.fixed_node", 2).rotor.torsion == Torsion(fixed_node=2)
-    assert with_key(spring, "rotor.torsion.free", True).rotor.torsion == Torsion(free=True)
+    assert with_keys(spring, {"rotor.torsion.fixed_node": 2}).rotor.torsion == Torsion(fixed_node=2)
+    assert with_keys(spring, {"rotor.torsion.free": True}).rotor.torsion == Torsion(free=True)
 
 
 def test_damping_stated_in_ratios_is_not_stated_twice(rig):
     table = rig.as_dict()
     table["rotor"]["damping"] = {"ratios": {"31.56": 0.08}}
     with pytest.raises(InputError, match=r"rotor\.damping\.ratios: conflicts with alpha and beta"):
-        with_key(rig_from_dict(table), "rotor.damping.alpha", 3.0)
+        with_keys(rig_from_dict(table), {"rotor.damping.alpha": 3.0})
 
 
 def test_keys_set_together_need_only_make_sense_together(rig):
     wide = {"rotor.shaft.inner_diameter": "25 mm", "rotor.shaft.outer_diameter": "30 mm"}
     assert with_keys(rig, wide).rotor.shaft[0].outer_diameter == 0.03
     with pytest.raises(InputError, match=r"rotor\.shaft\.1\.inner_diameter: 0\.025 m must be below"):
-        with_key(rig, "rotor.shaft.inner_diameter", "25 mm")
+        with_keys(rig, {"rotor.shaft.inner_diameter": "25 mm"})
 
 
 def test_a_rig_survives_json(rig):

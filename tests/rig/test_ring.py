@@ -12,7 +12,7 @@ from rubhpc import InputError, Rig, assemble, read_rig
 from rubhpc.integrate.marches.workspace import workspace
 from rubhpc.integrate.packing import pack, pairs_of
 from rubhpc.kernels.complementarity import UNSOLVED, solve_complementarity
-from rubhpc.rig.reading import rig_from_dict, with_key
+from rubhpc.rig.reading import rig_from_dict, with_keys
 from rubhpc.rig.stators import MOST_STATORS
 from rubhpc.study.study import make_axis
 
@@ -49,15 +49,15 @@ def test_rig_file_takes_a_ring_among_others(tmp_path):
 
 
 def test_stators_of_a_ring_have_keys_of_their_own():
-    rig = with_key(with_key(ring(4), "stator.length", "50 mm"), "stator.3.angle", "170 deg")
+    rig = with_keys(with_keys(ring(4), {"stator.length": "50 mm"}), {"stator.3.angle": "170 deg"})
     assert [s.length for s in rig.stator] == [0.05] * 4
     assert [round(math.degrees(s.angle)) for s in rig.stator] == [0, 90, 170, 270]
     assert make_axis("stator.4.clearance_offset", ["1 um"], rig).values == (1e-6,)
     with pytest.raises(InputError, match=r"stator\.5\.angle: unknown key; did you mean stator"):
-        with_key(rig, "stator.5.angle", 0.0)
+        with_keys(rig, {"stator.5.angle": 0.0})
     for key in ("stator.count", "stator.2.count"):
         with pytest.raises(InputError, match="cannot be set by a study; write it in the rig"):
-            with_key(rig, key, 3)
+            with_keys(rig, {key: 3})
         with pytest.raises(InputError, match="cannot be set by a study; write it in the rig"):
             make_axis(key, [3, 4], rig)
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
-from rubhpc.rig.reading import read_rig, with_key, with_keys
+from rubhpc.rig.reading import read_rig, with_keys
 from rubhpc.study.cases import CaseGrid
 from rubhpc.study.study import Contact, Integrator, Recording, Run, Study, make_axis
 
@@ -81,8 +81,8 @@ def test_growth_keeps_identity_and_ids(grid, data):
 @pytest.mark.parametrize(
     "change",
     [
-        {"rig": with_key(RIG, "stator.length", 0.041)},
-        {"rig": with_key(RIG, "rotor.bearing.2.kyz", 1.0)},
+        {"rig": with_keys(RIG, {"stator.length": 0.041})},
+        {"rig": with_keys(RIG, {"rotor.bearing.2.kyz": 1.0})},
         {"contact": Contact(normal="updated")},
         {"integrator": Integrator(step=0.4e-6)},
         {"recording": Recording(transient=121)},
@@ -103,7 +103,7 @@ def test_what_changes_results_changes_the_identity(change):
         {"title": "another"},
         {"output": Path("elsewhere.zarr"), "source": Path("a.toml")},
         {"rig": replace(RIG, name="by another name")},
-        {"rig": with_key(RIG, "rotor.bearing.stiffness", 1_000_000)},
+        {"rig": with_keys(RIG, {"rotor.bearing.stiffness": 1_000_000})},
         {"grid": SMALL | {"friction": [0.2]}},
         {"grid": SMALL | {"friction": [0.5, 0.1, 0.3, 0.2]}},
         {"recording": Recording(keep=("section", "spectrum", "waveform"))},
@@ -123,9 +123,9 @@ def test_what_the_rig_says_of_a_key_that_is_an_axis_leaves_the_identity(key, uni
     """Every case sets it; another key of the same part still counts."""
     grid = SMALL | {key: [0.05 * unit, 0.06 * unit]}
     identity = CaseGrid(study(grid)).identity
-    assert CaseGrid(study(grid, with_key(RIG, key, 0.055 * unit))).identity == identity
+    assert CaseGrid(study(grid, with_keys(RIG, {key: 0.055 * unit}))).identity == identity
     assert CaseGrid(study(SMALL | {key: [0.06 * unit, 0.07 * unit, 0.05 * unit]})).identity == identity
-    assert CaseGrid(study(grid, with_key(RIG, "stator.width", 0.004))).identity != identity
+    assert CaseGrid(study(grid, with_keys(RIG, {"stator.width": 0.004}))).identity != identity
     assert CaseGrid(study(SMALL)).identity != identity
 
 
@@ -181,7 +181,7 @@ def test_settings_lie_along_the_axes_that_set_them():
 
 
 def test_the_node_of_the_stator_is_where_the_amplitude_is_taken():
-    rig = with_key(RIG, "stator.radius", 0.06)
+    rig = with_keys(RIG, {"stator.radius": 0.06})
     case_grid = CaseGrid(study(SMALL | {"stator.node": [8, 5]}, rig))
     dims, amplitude = case_grid.operating_points()["contact_free_amplitude"]
     assert dims == ("speed_ratio", "stator_node")
@@ -237,7 +237,7 @@ def test_a_step_beyond_stability_is_refused_before_the_run():
 
 
 def test_an_offset_that_closes_a_gap_is_refused_with_the_settings():
-    rig = with_key(RIG, "stator.clearance_offset", "-90 um")  # 0.7 of 122 um is less
+    rig = with_keys(RIG, {"stator.clearance_offset": "-90 um"})  # 0.7 of 122 um is less
     with pytest.raises(InputError, match=r"\[grid\] clearance_ratio: .* leave no gap"):
         CaseGrid(study(rig=rig)).operating_points()
 
@@ -246,7 +246,7 @@ def test_a_refusal_of_the_settings_names_the_file(tmp_path):
     file = tmp_path / "study.toml"
     with pytest.raises(InputError, match=r"study\.toml: \[integrator\] step: 0\.001 s is above"):
         CaseGrid(study(integrator=Integrator(method="central-difference", step=1e-3), source=file))
-    rig = with_key(RIG, "stator.clearance_offset", "-90 um")
+    rig = with_keys(RIG, {"stator.clearance_offset": "-90 um"})
     with pytest.raises(InputError, match=r"study\.toml: \[grid\] clearance_ratio: .* leave no gap"):
         CaseGrid(study(rig=rig, source=file)).operating_points()
 

@@ -11,7 +11,7 @@ from rubhpc.integrate.periodic_motions import shared_motions
 from rubhpc.integrate.periodic_motions.known_motions import Approach
 from rubhpc.integrate.periodic_motions.powers import Powers
 from rubhpc.integrate.setup import prepare
-from rubhpc.rig.reading import read_rig, with_key
+from rubhpc.rig.reading import read_rig, with_keys
 from rubhpc.schema import REGIME
 from rubhpc.study.initial import Initial
 from rubhpc.study.study import Contact, Integrator, Recording
@@ -26,7 +26,7 @@ STARTS = [
 
 
 def set_up():
-    rig = with_key(read_rig("mokhtar2017"), "stator.youngs_modulus", 30e9)
+    rig = with_keys(read_rig("mokhtar2017"), {"stator.youngs_modulus": 30e9})
     return prepare(rig, SPEED, contact=Contact(), integrator=Integrator(), samples_per_revolution=32)
 
 
