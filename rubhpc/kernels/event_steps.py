@@ -1,4 +1,4 @@
-"""What the loops from event to event share: entering a contact mode, choosing a step, recording it."""
+"""Common parts of the event-driven loops: enter a contact mode, choose a step, record it."""
 
 from __future__ import annotations
 
@@ -51,9 +51,9 @@ def enter_wanted(
 def longest_step(
     clock: Clock, last_tick: int, highest_level: int, is_recorded: bool, is_ahead: bool, tick: int
 ) -> int:
-    """Level of the longest step from a tick: up to the end, and to the next sample of a record.
+    """Level of the longest step from a tick, up to the end and to the next sample of a record.
 
-    With `is_ahead`, samples are read from the beginning of the step: it may pass several of them.
+    With `is_ahead`, samples are read from the beginning of the step, which may pass several of them.
     """
     reach = last_tick
     if is_recorded:
@@ -64,27 +64,27 @@ def longest_step(
 
 @jit_inline_sum
 def contact_age(progress: Progress) -> int:
-    """Level of the time for which the contacts have been what they are.
+    """Level of the time since the last change of contacts.
 
-    What an event sets off is fast at first: no recorded step is longer than the contact has lasted.
+    Vibration after an event is fast at first: no recorded step is longer than the age of the contact.
     """
     return floor_log2(max(1, progress.tick - progress.entered))
 
 
 @jit_inline_sum
 def note_resolved(resolved: float, clock: Clock, highest_level: int, age: int, progress: Progress) -> None:
-    """Note the time (s) that resolves the contacts, at the level `age` of the time that they have lasted."""
+    """Store the time (s) that resolves the contacts, at the level `age` of their duration."""
     ticks = min(resolved / clock.tick, 1.0 * (1 << highest_level))
     progress.contact_age, progress.resolved_level = age, floor_log2(int(max(1.0, ticks)))
 
 
 @jit_inline_sum
 def choose_step(clock: Clock, progress: Progress, longest: int, interval: float) -> tuple[int, bool]:
-    """Level of the next step, `longest` at most, and whether it is known to be free of events.
+    """Level of the next step, at most `longest`, and whether it is certainly free of events.
 
-    While a gap is open or a force compressive, the switch function s obeys `s + s' t - b t^2 / 2 > 0` for an
-    `interval` (s) that the bound b on its second derivative gives: steps within it miss no event.
-    Event-search steps, not longer than `2^search_level` ticks, need none; they are checked at their end.
+    While a gap is open or a force compressive, the switch function s satisfies `s + s' t - b t^2 / 2 > 0` for
+    an `interval` (s), with the bound b on its second derivative: steps within it miss no event. Event-search
+    steps of up to `2^search_level` ticks need no bound; they are checked at their end.
     """
     level, is_event_free = longest, False
     if progress.is_after_event == 1:
@@ -111,7 +111,7 @@ def sample_step(
     samples: Samples,
     accumulator: Accumulator,
 ) -> None:
-    """Record the samples within a step, from the coordinates at its beginning, which is the first of them."""
+    """Record the samples within a step, from the coordinates at its beginning, the first sample."""
     count = max(1, (1 << level) >> clock.sample_level)
     interval = clock.tick * (1 << clock.sample_level)
     first = progress.next_sample
@@ -130,7 +130,7 @@ def end_record(
     samples: Samples,
     accumulator: Accumulator,
 ) -> None:
-    """Close the record where it ends: its last interval between samples, and the energies."""
+    """Close the record at its end: the last interval between samples, and the energies."""
     if end_samples(tables, clock, is_sample, z, progress, recorder, samples, accumulator):
         end_span(tables, clock, z, progress, recorder, accumulator)
 
@@ -146,7 +146,7 @@ def end_samples(
     samples: Samples,
     accumulator: Accumulator,
 ) -> bool:
-    """Take the last interval between samples; whether the record ends at the tick reached."""
+    """Close the last interval between samples; returns whether the record ends at the current tick."""
     is_end = progress.tick == clock.n_sample << clock.sample_level
     if is_end and is_sample:
         count = clock.n_sample + 1 - progress.next_sample
@@ -202,7 +202,7 @@ def end_mode(
     recorder: Recorder,
     accumulator: Accumulator,
 ) -> bool:
-    """Go on where `leave_mode` has filled the motion; `z` are the coordinates of the span that ends."""
+    """Continue after `leave_mode` has filled the motion; `z` are the coordinates at the end of the span."""
     count_event(clock, progress)
     if is_beyond(reduced, motion):
         return False
@@ -215,7 +215,7 @@ def end_mode(
 
 @jit_inline_sum
 def count_event(clock: Clock, progress: Progress) -> None:
-    """Count an event among those of a revolution, anew with the first one after it."""
+    """Count an event of a revolution; the count restarts with the first event after it."""
     if progress.tick - progress.counted_from > clock.samples_per_revolution << clock.sample_level:
         progress.counted_from, progress.n_event = progress.tick, 0
     progress.n_event += 1
@@ -225,7 +225,7 @@ def count_event(clock: Clock, progress: Progress) -> None:
 def record_event(
     clock: Clock, progress: Progress, before: Floats, i: int, samples: Samples, accumulator: Accumulator
 ) -> None:
-    """Add what pair i got by an event to the means of its force; `before` (q,) are impulses, N s."""
+    """Add the impulse of pair i at an event to the means of its force; `before` (q,) are impulses, N s."""
     interval = clock.tick * (1 << clock.sample_level)
     gained = accumulator.impulse[i] - before[i]
     samples.force[i, progress.tick >> clock.sample_level] += gained / interval

@@ -1,7 +1,7 @@
-"""States of a pair under set-valued friction, two bits a pair in a set of states.
+"""States of a pair under set-valued friction, two bits per pair in a set of states.
 
-Under a penalty with a damper an open pair may be lifted: overlapped still, its force ended by the damper. A
-further bit a pair says so, behind those of all states.
+Under a penalty with a damper an open pair may be lifted: it still overlaps, but the damper has ended its
+force. This is a further bit per pair, after those of all states.
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ from rubhpc.kernels._jit import jit_inline_sum
 
 Floats = NDArray[np.float64]
 
-OPEN, FORWARD, BACKWARD, STUCK = range(4)  # the rim outruns the tip, the tip outruns the rim
-MOST_PAIRS = 31  # whose states an integer holds
-MOST_SOFT_PAIRS = 20  # likewise, with the bits of those that are lifted
+OPEN, FORWARD, BACKWARD, STUCK = range(4)  # FORWARD: the rim is faster than the tip; BACKWARD: slower
+MOST_PAIRS = 31  # whose states fit into an integer
+MOST_SOFT_PAIRS = 20  # likewise, with the bits of lifted pairs
 
 
 class FrictionBodies(NamedTuple):
-    """What set-valued friction asks of the reduced bodies, q pairs."""
+    """Properties of the reduced bodies for set-valued friction, q pairs."""
 
     sliding: Floats  # (q,), coefficient
     static: Floats  # (q,), coefficient of a pair that sticks
     rim_speed: Floats  # (q,), m/s, not negative
-    # How rates of gaps, then of slips change without contact forces, m/s2: by the motion (2 n,), negative,
-    # and by the unbalance
+    # Accelerations of gaps, then of slips without contact forces, m/s2: by the motion (2 n,), negative, and
+    # by the unbalance
     pull: Floats  # (2 q, 2 n)
     turned: Floats  # (2 q, 2), times the cosine and the sine of the shaft's angle
 
@@ -40,11 +40,11 @@ def state_of(states: int, i: int) -> int:
 
 @jit_inline_sum
 def lifted_place(q: int, i: int) -> int:
-    """Place of the bit that says whether pair i of q is lifted."""
+    """Place of the bit for pair i of q being lifted."""
     return 2 * q + i
 
 
 @jit_inline_sum
 def stuck_pairs(states: int) -> int:
-    """Bits of the pairs that stick, two places a pair; 0 where none does."""
+    """Bits of the sticking pairs, two places per pair; 0 where none sticks."""
     return states & (states >> 1) & 0x1555555555555555

@@ -1,4 +1,4 @@
-"""Pieces of a run-up, one after the other, each at a speed to which the tables are tuned beforehand."""
+"""Consecutive pieces of a run-up, each at a speed to which the tables have been tuned."""
 
 from __future__ import annotations
 
@@ -53,12 +53,12 @@ def advance_pieces(
     samples: Samples,
     sums: Accumulator,
 ) -> int:
-    """Advance a case through pieces, from where `pieces.at` says, with every sample recorded.
+    """Advance a case through pieces, from `pieces.at` on, and record every sample.
 
     Parameters
     ----------
     tables : ModeTables
-        Their masks are set to those of the piece under way.
+        Their masks are set to those of the current piece.
     reduced : Reduced
         Its unbalance and rim speeds are set.
     clock : Clock
@@ -66,13 +66,13 @@ def advance_pieces(
     samples : Samples
         Of one piece.
     sums : Accumulator
-        (1 + k c, ...) each: of what came before, then of every part of the pieces; at zero.
+        (1 + k c, ...) each: of the time before, then of every part of the pieces, zero on entry.
 
     Returns
     -------
     int
-        FINISHED, or what `event_loop.advance` stopped with in the piece under way. MODE_WANTED asks for the
-        set `progress.wanted`, tuned to that piece and those after it.
+        FINISHED, or the outcome of `event_loop.advance` in the current piece. MODE_WANTED requests the set
+        `progress.wanted`, tuned to that piece and those after it.
     """
     at, n_part = pieces.at, pieces.n_sample // pieces.n_part_sample
     while at[PIECE] < pieces.spin.size:

@@ -1,4 +1,4 @@
-"""Pieces of a run-up that have matrices in common: what loops over them begin and end each with."""
+"""Pieces of a run-up with the same matrices: common parts of the loops over them."""
 
 from __future__ import annotations
 
@@ -22,38 +22,38 @@ Ints = NDArray[np.int64]
 
 PIECE, PART, STAGE, STANDING = range(4)  # of `Pieces.at`
 TO_BEGIN, TO_ENTER, PART_TO_BEGIN, IN_PART = range(4)  # stages of a piece
-# Frequency of a mode over the spin, and times the duration of a piece, above which it goes on as it is where
-# the speed changes.
+# Frequency of a mode over the spin, and times the duration of a piece, above which it continues unchanged
+# where the speed changes.
 FAST, QUICK = 3.0, 0.5 * np.pi
 
 
 class Pieces(NamedTuple):
-    """Pieces that have matrices and a number of samples in common, k of them, in c parts each."""
+    """The k pieces with the same matrices and number of samples, in c parts each."""
 
     spin: Floats  # (k,), rad/s
     growth: Floats  # (k,), 1/s, of the unbalance force
     tick: Floats  # (k,), s
     search_level: Ints  # (k,)
     force: Floats  # (k, 2, n), of the unbalance: times cosine and sine of the shaft's angle
-    since: Floats  # (k,), s, from the beginning of the piece before to that of this one
+    since: Floats  # (k,), s, from the beginning of the previous piece to that of this one
     table: Ints  # (p,), set of closed pairs of each of the tables, NONE for one that is not tuned
-    n_room: int  # tables of each set, one a piece
+    n_room: int  # tables of each set, one per piece
     n_sample: int  # of a piece
-    n_part_sample: int  # of each of its parts, which have sums of their own
+    n_part_sample: int  # of each of its parts, which have their own sums
     energy_limit: float  # J
-    at: Ints  # (4,), which piece, which part of it, the stage that it is in, the set of contacts before it
-    moved_by: int  # bits of a set that decide how bodies move; 0 where modes do not follow the speed
-    left: Floats  # (2, m), coordinates at the end of the piece before
-    motion: Floats  # (k + 1, 2 n), at the beginning of each piece; of the first one given
+    at: Ints  # (4,), piece, part of it, stage, set of contacts before it
+    moved_by: int  # bits of a set that determine the motion; 0 where modes do not follow the speed
+    left: Floats  # (2, m), coordinates at the end of the previous piece
+    motion: Floats  # (k + 1, 2 n), at the beginning of each piece; given for the first one
     pressing: Floats  # (k + 1, q), N, contact forces there
-    seen: Floats  # (2, 3 + places), `Recorder.last` at the beginning of the piece under way
+    seen: Floats  # (2, 3 + places), `Recorder.last` at the beginning of the current piece
     n_step: Ints  # (k,), steps taken
     whole: Floats  # (o, k n_sample), samples
 
 
 @jit_inline_sum
 def clock_of(clock: Clock, pieces: Pieces, piece: int) -> Clock:
-    """How a piece counts time, from how any of them does."""
+    """Clock of a piece, from that of any other."""
     return Clock(
         pieces.spin[piece],
         pieces.tick[piece],
@@ -68,7 +68,7 @@ def clock_of(clock: Clock, pieces: Pieces, piece: int) -> Clock:
 
 @jit_inline_sum
 def start_piece(reduced: Reduced, pieces: Pieces, piece: int, recorder: Recorder, samples: Samples) -> None:
-    """Turn the unbalance and the rims at the speed of a piece, and clear the room for its samples."""
+    """Set unbalance and rims to the speed of a piece, and clear the arrays for its samples."""
     for k in range(reduced.force_cosine.size):
         reduced.force_cosine[k], reduced.force_sine[k] = pieces.force[piece, 0, k], pieces.force[piece, 1, k]
     for i in range(reduced.radius.size):
@@ -83,7 +83,7 @@ def start_piece(reduced: Reduced, pieces: Pieces, piece: int, recorder: Recorder
 
 @jit_inline_sum
 def end_piece(pieces: Pieces, piece: int, n_step: int, standing: int, z: Floats, samples: Samples) -> None:
-    """Keep the samples of a piece, and go on to the next."""
+    """Store the samples of a piece and continue with the next."""
     pieces.n_step[piece] = n_step
     pieces.at[STANDING] = standing
     for row in range(2):
@@ -98,7 +98,7 @@ def end_piece(pieces: Pieces, piece: int, n_step: int, standing: int, z: Floats,
 
 @jit_inline_sum
 def set_masks(mask: Ints, table: Ints, n_room: int, piece: int) -> None:
-    """Show the tables that are tuned to a piece, and no others."""
+    """Enable only the tables that are tuned to a piece."""
     for place in range(mask.size):
         mask[place] = table[place] if place % n_room == piece else NONE
 
@@ -114,8 +114,8 @@ def begin_piece(
 ) -> bool:
     """Begin in the set wanted, at the shaft's angle 0; False where it is not tuned.
 
-    In the set of the piece before fast modes go on as they are: the speed changes evenly, and shapes that
-    follow it do not make them ring.
+    In the set of the previous piece fast modes continue unchanged: the speed changes linearly, so that shapes
+    which follow it do not make them ring.
     """
     piece = pieces.at[PIECE]
     lasts = pieces.n_sample * pieces.tick[piece] * (1 << sample_level)
@@ -145,7 +145,7 @@ def read_motion(tables: ModeTables, mode: int, z: Floats, motion: Floats) -> Non
 
 @jit_inline_sum
 def begin_part(part: Accumulator, before: Accumulator, since: float, closed: int) -> None:
-    """Go on from the sums before, whose clock began `since` (s) ago, with the pairs of `closed` touching."""
+    """Continue from the sums before, whose clock began `since` (s) ago; pairs of `closed` are touching."""
     q, n_row, n = part.force_piece.shape
     for i in range(q):
         for row in range(n_row):
@@ -153,7 +153,7 @@ def begin_part(part: Accumulator, before: Accumulator, since: float, closed: int
                 part.force_piece[i, row, k] = before.force_piece[i, row, k]
         for k in range(2):
             part.force_held[i, k] = before.force_held[i, k]
-        part.force_piece[i, LOUD, 0] = np.inf  # to a peak that begins anew
+        part.force_piece[i, LOUD, 0] = np.inf  # relative to a peak that is reset
     part.origin[0] = before.origin[0] + since
     for i in range(part.is_touching.size):
         part.is_touching[i] = (closed >> i) & 1 == 1
@@ -161,7 +161,7 @@ def begin_part(part: Accumulator, before: Accumulator, since: float, closed: int
 
 @jit_inline_sum
 def row_of(sums: Accumulator, i: int) -> Accumulator:
-    """Those of one part."""
+    """The sums of one part."""
     return Accumulator(
         sums.highest[i],
         sums.lowest[i],

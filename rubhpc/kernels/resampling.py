@@ -1,4 +1,4 @@
-"""Signals sampled at even times, at even angles of a shaft whose speed changes."""
+"""Resampling of signals from even times to even angles of a shaft whose speed changes."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ NODES = 4  # of the cubic through the samples around an instant
 
 @jit
 def resample(rows: Floats, swing: Floats, cuts: Ints) -> None:
-    """Bring signals (r, n) to even angles between any of `cuts` (k + 1,) and the next, from 0 to n, in place.
+    """Resample signals (r, n) to even angles between consecutive `cuts` (k + 1,), from 0 to n, in place.
 
-    There they are sampled at even times, and the speed changes evenly by `swing` (k,) times the sum of the
-    first and the last: with the swing e, the shaft has come to the share x of the angle at the share y of the
-    time where `x = (1 - e) y + e y^2`. By Lagrange's cubic through the four samples that are nearest, the
-    cuts included; it is exact for cubics of the time.
+    There they are sampled at even times, and the speed changes linearly by `swing` (k,) times the sum of the
+    first and the last one. With the swing e, the shaft reaches the share x of the angle at the share y of the
+    time with `x = (1 - e) y + e y^2`. The interpolation is Lagrange's cubic through the four nearest samples,
+    including the cuts; it is exact for cubics of the time.
     """
     n = rows.shape[1]
     if n < NODES:

@@ -1,4 +1,4 @@
-"""What laws of contact add to tables at another spin speed: what goes as the rims move, and springs."""
+"""Parts of tables by laws of contact at another spin speed: terms of the rim speed, and springs."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
-NO_RIM = -1  # in place of a coordinate
+NO_RIM = -1  # instead of a coordinate
 
 
 class RimPart(NamedTuple):
-    """What of a mode goes as the rims move: the coordinate that is 1, and growth, at the matrices' speed.
+    """Part of a mode by the rim speed: the constant coordinate and growth, at the speed of the matrices.
 
     n reduced degrees, r switch functions, o output rows, tables of the width m.
     """
 
     one: int  # the coordinate, or NO_RIM
     motion: Complexes  # (2 n,)
-    entered: Complexes  # (m,), of its part of `enter_constant`
-    switch: Complexes  # (r,), what of it goes with the speed
-    fixed: Complexes  # (r,), what does not
+    entered: Complexes  # (m,), its part of `enter_constant`
+    switch: Complexes  # (r,), part proportional to the speed
+    fixed: Complexes  # (r,), constant part
     rate: Complexes  # (r,)
     loss: Floats  # (2, 2 m), rows of the form
     power: float  # W
@@ -40,11 +40,11 @@ class RimPart(NamedTuple):
 
 
 class Springs(NamedTuple):
-    """Springs that press in a mode, k of them."""
+    """The k pressed springs of a mode."""
 
     half: float  # N/m, of their stiffness
     gap: Floats  # (k, n), gaps by reduced displacements
-    overlap: Floats  # (k, 2 m), gaps by coordinates: those that go with the speed are filled in
+    overlap: Floats  # (k, 2 m), gaps by coordinates; those proportional to the speed are filled in
 
 
 @jit
@@ -58,7 +58,7 @@ def move_rim(
     row: Complexes,
     work: Complexes,
 ) -> None:
-    """Bring what goes as the rims move to a `share` of the speed of the matrices.
+    """Scale the part by the rim speed to a `share` of the speed of the matrices.
 
     `velocity` and `resisting` (m, n), `row` (o, m) and `work` (2, m) are those of the mode.
     """
@@ -98,7 +98,7 @@ def follow_growth(
     x: Complexes,
     resisting: Complexes,
 ) -> None:
-    """Add what coordinates that grow share with the response `x` (2 n,), the coordinate `first`.
+    """Add the products of growing coordinates with the response `x` (2 n,), the coordinate `first`.
 
     `turning` (1/s) is the exponent of the response.
     """
@@ -125,7 +125,7 @@ def follow_growth(
 
 @jit
 def stretch_springs(tables: ModeTables, mode: int, springs: Springs, first: int, one: int) -> None:
-    """Add the energy that springs hold by the response, the coordinate `first`, and as the rims move."""
+    """Add the energy of springs by the response, the coordinate `first`, and by the rim speed."""
     n_spring, n = springs.gap.shape
     width, loss = tables.loss.shape[1] // 2, tables.loss[mode]
     moving = np.array([first, width + first, one, width + one])

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Block:
-    """The set-ups of pieces that share matrices and sag; each is made when it is first asked for.
+    """The set-ups of pieces that share matrices and sag; each is made when first needed.
 
     Parameters
     ----------

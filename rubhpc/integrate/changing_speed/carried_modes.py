@@ -1,12 +1,11 @@
-"""Higher modes carried over a change of the matrices, which else would make them ring.
+"""Higher modes across a change of the held matrices, without artificial ringing.
 
-With the speed a mode's response to what is slower than itself changes evenly; matrices that are held change
-at once. In the modes `l` of the matrices to come, a motion `exp(m t)` that went on unchanged would leave each
-mode another amount to ring with. An even change from the time `-a` before to `b` after leaves of it the mean
-of `exp((m - l) s)` over these times, which is 1 for what is slow and vanishes for what is fast. Powers of it,
-but for the phase, stand for a change that begins and ends smoothly; what dies away within these times leaves
-nothing. Of a motion that has touched, higher modes that ring go on as they are. What a sudden change of the
-acceleration makes ring is real, and stays.
+The quasi-static response of a fast mode changes gradually with the speed, but held matrices change at once.
+In the modes `l` of the next matrices, a motion `exp(m t)` that continued unchanged would excite each mode. A
+linear change from the time `-a` before to `b` after excites it by the mean of `exp((m - l) s)` over these
+times, which is 1 for slow motions and vanishes for fast ones. Powers of its modulus represent a change that
+begins and ends smoothly; a motion that decays within these times has no effect. After a contact, ringing
+higher modes continue unchanged. Ringing by a sudden change of the acceleration is real, and kept.
 """
 
 from __future__ import annotations
@@ -27,15 +26,15 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
-LOWEST = 3.0  # frequency of a mode over the spin; lower ones take part in contact
+LOWEST = 3.0  # frequency of a mode over the spin; lower modes take part in contact
 # The same of what has not touched and rings long: its damping over its frequency.
 LOWEST_RINGING, RINGING = 1.5, 0.1
-TOUCH = 0.25  # revolutions, at most, before and after which a contact is what it is
-SLOW = 1e-6  # exponent times time below which a change is at once
+TOUCH = 0.25  # revolutions, at most, before and after a change in motions with contact
+SLOW = 1e-6  # exponent times time, below which a change is immediate
 
 
 class Standing(NamedTuple):
-    """Where a piece has ended, in its own matrices."""
+    """End of a piece, in its own matrices."""
 
     setup: PieceSetup
     library: RetunedLibrary
@@ -48,7 +47,7 @@ class Change(NamedTuple):
     """How the speed changes where matrices do."""
 
     held_for: float  # s, since when the matrices before were held
-    ahead: float  # s, that the piece to come takes
+    ahead: float  # s, duration of the next piece
     jump: float = 0.0  # rad/s^2, sudden change of the acceleration
 
 
@@ -60,7 +59,7 @@ class Parts(NamedTuple):
 
 
 def standing(march: EventDrivenMarch, setup: PieceSetup, end: Place, time: float) -> Standing | None:
-    """Where a march has ended a piece; None where modes are not carried over."""
+    """End of a piece by a march; None where modes are not carried over."""
     library = march.library
     if not isinstance(library, RetunedLibrary):
         return None
@@ -70,16 +69,16 @@ def standing(march: EventDrivenMarch, setup: PieceSetup, end: Place, time: float
 def carried(
     before: Standing, change: Change, march: EventDrivenMarch, setup: PieceSetup, begun: Place
 ) -> Place:
-    """The place from which a piece begins, with what its matrices would make ring taken off.
+    """The start of a piece, without the ringing that its new matrices would cause.
 
     Parameters
     ----------
     before : Standing
         At the same instant.
     march : EventDrivenMarch
-        Which stands nowhere afterwards, until it begins again.
+        It has no valid state afterwards, until it begins again.
     begun : Place
-        From which the piece would begin.
+        The start without this correction.
     """
     march.begin(setup, begun)
     library, mask = march.library, march.mask
@@ -111,7 +110,7 @@ def carried(
     left[0, :, -1] -= direct[fast]
     left[1, :, -1] -= mirrored[fast]
     left[0, :, -2] -= (march.constants @ now.constant)[fast]
-    real = np.zeros_like(left)  # what is sudden indeed
+    real = np.zeros_like(left)  # really sudden changes
     if change.jump:
         slow = np.append(np.abs(was.exponent) <= LOWEST * spin, [True, True])
         pushing = Parts(parts.exponent[slow], parts.shape[:, slow])
@@ -127,9 +126,9 @@ def carried(
 
 
 def left_over(exponent: Complexes, before: float, after: float, *, has_touched: bool) -> Complexes:
-    """What an even change from a time before, s, to one after leaves of what it would be at once.
+    """Factor of a gradual change from a time before, s, to one after, relative to a sudden one.
 
-    `exponent` (1/s) is that of the motion less that of the mode which it makes ring.
+    `exponent` (1/s) is that of the motion minus that of the excited mode.
     """
     whole = 0.5 * (before + after)
     x = exponent * whole
@@ -142,7 +141,7 @@ def left_over(exponent: Complexes, before: float, after: float, *, has_touched: 
 
 
 def _spans(before: Standing, new: PieceSetup, change: Change) -> tuple[float, float]:
-    """Times, s, since the speed was that of the matrices before, and until it is that of those to come.
+    """Times, s, since the speed of the previous matrices, and until that of the next ones.
 
     Matrices that follow the speed change evenly: a revolution before and after parts slow from fast.
     """
@@ -160,7 +159,7 @@ def _spans(before: Standing, new: PieceSetup, change: Change) -> tuple[float, fl
 
 
 def _pushed(parts: Parts, exponent: Complexes, enter: Complexes, stiffness: Floats) -> Complexes:
-    """What each part and its conjugate make of each mode, (2, modes, p), as a stiffness acts at once."""
+    """Excitation of each mode by each part and its conjugate, (2, modes, p), as a stiffness acts at once."""
     n = len(stiffness)
     given = 0.5 * (enter[:, n:] @ stiffness) @ np.stack([parts.shape[:n], parts.shape[:n].conj()])
     pushed: Complexes = given / _apart(parts, exponent)
@@ -168,7 +167,7 @@ def _pushed(parts: Parts, exponent: Complexes, enter: Complexes, stiffness: Floa
 
 
 def _apart(parts: Parts, exponent: Complexes) -> Complexes:
-    """Exponents of the parts and of their conjugates less those of the modes, (2, modes, p)."""
+    """Exponents of the parts and of their conjugates minus those of the modes, (2, modes, p)."""
     both = np.stack([parts.exponent, parts.exponent.conj()])
     apart: Complexes = both[:, np.newaxis] - exponent[:, np.newaxis]
     return apart

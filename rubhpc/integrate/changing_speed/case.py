@@ -1,4 +1,4 @@
-"""One case whose speed changes: signals, what is known of every revolution, and measures of the whole."""
+"""One case whose speed changes: signals, values of every revolution, and measures of the whole."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ WINDOW = 6  # revolutions over which orders are taken, whole periods of all of t
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RunUpRecord:
-    """What a case of a study that runs up yields.
+    """Result of a run-up case of a study.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class RunUpRecord:
     measures : dict
         Of the whole run-up.
     remark : str
-        Why it ended early, or what is wrong with its result; "" where nothing is.
+        Reason of an early end, or problem of the result; "" without one.
     """
 
     arrays: dict[str, Floats]
@@ -69,7 +69,7 @@ def record_run_up(
 ) -> RunUpRecord:
     """Integrate a case whose speed changes; arguments as of `integrate_run_up` or `integrate_driven`.
 
-    A case that ends early is a diverged one, and has its revolutions up to there.
+    A case that ends early counts as diverged, and has its revolutions up to the end.
     """
     if not isinstance(setup, ModalSetup):
         raise InputError(
@@ -134,7 +134,7 @@ def driven_measures(found: RunUp) -> dict[str, float]:
 
 
 def by_revolution(found: RunUp, signals: dict[str, Floats], per_revolution: int) -> dict[str, Floats]:
-    """What is known of every revolution, by the names of `schema.run_up_variables`.
+    """Values of every revolution, by the names of `schema.run_up_variables`.
 
     Amplitudes (zero to peak) and phases (rad, by which a signal leads the order of the shaft's angle) are
     (n_revolution, n_order), over a window of six revolutions around each.

@@ -5,12 +5,12 @@ the spin has the momentum `P = J phi' + m(u)` with `m = Re[i p exp(i phi)] u' - 
 
     P' = T(phi') - friction torque - phi' Re[p exp(i phi)] u'.
 
-Pieces are those of run-ups (`run_up`), each at the mean of its first and last speed. The work W
-that the unbalance force does on the motion of a piece is `phi'^2 Re[p exp(i phi)] u' - phi'' m`, integrated,
-of which m is taken as the mean of its ends: so the speed at the end follows from what acted within, and what
-the spin loses the motion gains, exactly. The acceleration with which a piece is taken is a guess; the piece
-is taken again where what follows differs from it, and halved where it differs by far. Errors fall with the
-square of the piece.
+Pieces are those of run-ups (`run_up`), each at the mean of its first and last speed. The work W of the
+unbalance force on the motion of a piece is the integral of `phi'^2 Re[p exp(i phi)] u' - phi'' m`, with m as
+the mean of its ends. The speed at the end follows from the torques within the piece, and the spin loses
+exactly the energy that the motion gains. The acceleration of a piece is a guess: the piece is repeated where
+the result differs from it, and halved where it differs strongly. Errors are proportional to the square of the
+length of pieces.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ ALL_TURNED, TOO_SLOW, TOO_FAST = range(3)  # why a record ends
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DrivenRun(RunUp):
-    """What a driven rotor has yielded, revolution by revolution.
+    """Result of a driven rotor, revolution by revolution.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class DrivenRun(RunUp):
     braking_torque : (n_revolution,), N m
         Mean torque by which friction and whirl brake the spin.
     energy_residual : float
-        Of the energy balance of all that moves, the spin included.
+        Of the energy balance of the motion, including the spin.
     end : int
         ALL_TURNED, TOO_SLOW or TOO_FAST.
     last_speed : float, rad/s
@@ -84,12 +84,11 @@ def integrate_driven(
     Parameters
     ----------
     fastest : ModalSetup
-        The case at a speed that it does not pass, with a free spin.
+        The case at a speed that it does not exceed, with a free spin.
     clearance : float, m
     friction : float
     pieces_per_revolution : int, optional
-        Into how many pieces every revolution is cut, a divisor of the samples in it; by default as the change
-        of speed asks for.
+        Number of pieces per revolution, a divisor of its samples; by default as the change of speed requires.
     check : callable, optional
         Called between kernel calls; what it raises ends the case.
 
@@ -188,7 +187,7 @@ def _fitting(length: int, at: int, end: int, per_revolution: int) -> int:
 
 
 def _residual(energies: Floats) -> float:
-    """What the balance of energies (6,) lacks, J, over what was exchanged."""
+    """Residual of the balance of energies (6,), J, over the exchanged energy."""
     spin, motion, drive, friction, damping, impacts = energies.tolist()
     flows = abs(drive) + abs(friction) + abs(damping) + abs(impacts)
     exchanged = max(0.5 * (flows + abs(spin) + abs(motion)), LEAST_EXCHANGE * abs(spin), np.finfo(float).tiny)

@@ -1,4 +1,4 @@
-"""What enters the eigenmodes of a contact mode, at any speed of the shaft."""
+"""Coordinates of the eigenmodes of a contact mode for a motion, at any speed of the shaft."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Complexes = NDArray[np.complex128]
 
 
 class Eigenmodes(NamedTuple):
-    """Eigenmodes of a set of closed pairs, m of them, which no speed changes."""
+    """The m eigenmodes of a set of closed pairs, which do not depend on the speed."""
 
     exponent: Complexes  # (m,), 1/s
     is_pair: NDArray[np.bool_]  # (m,)
@@ -31,7 +31,7 @@ class Eigenmodes(NamedTuple):
 
     @classmethod
     def of(cls, row: ModeTables, held: HeldMode, within: float, rise: float) -> Eigenmodes:
-        """Those of tables that follow the speed, at a place in the range and of the acceleration."""
+        """Eigenmodes of tables that follow the speed, at a place in the range and of the acceleration."""
         varying, m = held.varying, held.is_pair.size
         for course in (varying.kept_shape, varying.kept_entry):
             take_course(course, within, rise, varying.kept)
@@ -63,7 +63,7 @@ class Eigenmodes(NamedTuple):
         return coordinates
 
     def forced(self, turning: complex, factor: complex) -> tuple[Complexes, Complexes]:
-        """Response to the unbalance at time 0: what turns as `exp(turning t)`, and what as its conjugate."""
+        """Response to the unbalance at time 0: parts with `exp(turning t)` and with its conjugate."""
         direct = self.drive * factor / (turning - self.exponent)
         mirrored = self.mirrored_drive * factor / (turning - self.exponent.conj())
         other: Complexes = np.where(self.is_pair, mirrored, direct).conj()

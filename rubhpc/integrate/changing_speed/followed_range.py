@@ -1,8 +1,8 @@
-"""Ranges of speed over which contact modes may follow those of three speeds (`followed_modes`).
+"""Ranges of speed over which contact modes are interpolated from three speeds (`followed_modes`).
 
-At both ends of a range, within it and where it meets a resonance the modes followed are held against the
-matrices themselves (`range_errors`). Held matrices err by the first order of a range, the modes followed by
-the third.
+At both ends of a range, within it and at resonances the interpolated modes are compared with the matrices
+(`range_errors`). The error of held matrices is of first order in the range, that of interpolated modes of
+third order.
 """
 
 from __future__ import annotations
@@ -41,23 +41,23 @@ if TYPE_CHECKING:
     Ints = NDArray[np.int64]
     Complexes = NDArray[np.complex128]
 
-AT_ENDS = 0.5  # error at the ends of a range over the accuracy, of which the third order leaves little inside
-SAFE = 0.9  # share of the range that would just do
+AT_ENDS = 0.5  # error at the ends of a range over the accuracy; inside it is smaller
+SAFE = 0.9  # share of the widest accurate range
 LEAST, MOST = 0.5, 0.85  # factors by which a range shrinks
-STEEPEST = 5.0  # power of the range with which its error is taken to grow
-CLOSE = 1.2  # ratio of a range that will not do and one that does, to be left at that
+STEEPEST = 5.0  # assumed power of the error in the range
+CLOSE = 1.2  # ratio of an inaccurate and an accurate range at which the search ends
 
 
 class Reach(NamedTuple):
     """A range of speeds and of accelerations."""
 
     half: float  # rad/s
-    swing: float  # rad/s^2, by which the acceleration may change where nothing goes with it
-    judge: Judge | None = None  # where modes go with the acceleration too
+    swing: float  # rad/s^2, allowed change of the acceleration where modes do not follow it
+    judge: Judge | None = None  # where modes follow the acceleration too
 
 
 def rotor_of(setup: ModalSetup, matrices: Matrices, phasor: Complexes, seen: Floats) -> Rotor:
-    """What moves with the speed's matrices, of a set-up; `seen` are its signals, to which contacts come."""
+    """Degrees of a set-up whose matrices depend on the speed; `seen` are its signals, besides contacts."""
     touched = setup.reduced.degree[:, [V, W, TORSION]].reshape(-1, phasor.size)
     touched = np.unique(touched[np.any(touched != 0.0, axis=1)], axis=0)
     near = np.stack([touched, 0.0 * touched, 0.0 * touched])
@@ -75,7 +75,7 @@ def followed_reach(
     accuracy: float,
     others: tuple[float, float],
 ) -> Reach:
-    """The widest range that begins at a speed (rad/s) and goes on as the acceleration does.
+    """The widest range that begins at a speed (rad/s), in the direction of the acceleration.
 
     Parameters
     ----------
@@ -113,9 +113,9 @@ def followed_reach(
 def _widest_within(
     rotor: Rotor, speed: float, sense: float, widest: float, acceleration: float, allowed: float
 ) -> tuple[float, list[tuple[Complexes, Complexes]] | None]:
-    """Half of the widest range whose error is allowed, at most `widest` (rad/s), and its modes.
+    """Half of the widest accurate range, at most `widest` (rad/s), and its modes.
 
-    Narrower ranges are asked until one will do, and then those between it and the last that will not.
+    The range is narrowed until it is accurate, then bisected with the last inaccurate one.
     """
     half, too_wide, least = widest, math.inf, NARROWEST * speed
     best: tuple[float, list[tuple[Complexes, Complexes]]] | None = None
@@ -138,7 +138,7 @@ def _widest_within(
 
 
 def _part(rotor: Rotor, speed: float, other: float) -> Ints:
-    """Degrees that matrices which go with the speed couple."""
+    """Degrees coupled by matrices that depend on the speed."""
     (stiffness, damping), (next_stiffness, next_damping) = rotor.matrices(speed), rotor.matrices(other)
     moved = (stiffness != next_stiffness) | (damping != next_damping)
     linked = (stiffness != 0.0) | (damping != 0.0) | moved
@@ -215,7 +215,7 @@ def _modes(stiffness: Floats, damping: Floats) -> tuple[Complexes, Complexes]:
 def _in_order(
     middle: tuple[Complexes, Complexes], other: tuple[Complexes, Complexes]
 ) -> tuple[Complexes, Complexes] | None:
-    """Another speed's modes in order, length and phase of those in the middle; None where they are others."""
+    """Modes of another speed in order, length and phase of those in the middle; None without a match."""
     seen: Complexes = np.linalg.solve(middle[1], other[1]).astype(np.complex128)
     found = aligned(seen, middle[0])
     if found is None:

@@ -39,16 +39,16 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-DRIVEN_LAG = 0.25 * LAG  # rad, by which the shaft may depart from its angle: the twist feels its speed too
-# Rub comes in touches, between which the speed is not on its mean line: its share of the torques counts so
+DRIVEN_LAG = 0.25 * LAG  # rad, deviation of the shaft's angle; the twist depends on its speed too
+# Rub acts in touches, between which the speed deviates from its mean line. Its share of the torques counts so
 # many times, down to this part of a revolution.
 UNEVEN, SHORTEST = 25.0, 4
-GUESSED = 0.005 * LAG  # rad, by which the shaft's angle may depart from that of the acceleration guessed
-MOST_TRIES = 4  # of a piece, after which it is halved
+GUESSED = 0.005 * LAG  # rad, deviation of the shaft's angle from that with the guessed acceleration
+MOST_TRIES = 4  # tries of a piece before it is halved
 
 
 class Taken(NamedTuple):
-    """A piece that has been taken."""
+    """A finished piece."""
 
     passed: Passed
     lag: float  # rad, as of `speed_law.LAG`
@@ -60,7 +60,7 @@ class Taken(NamedTuple):
 
 
 class Spin:
-    """The spin of a case under way, and the motion that it carries."""
+    """The spin of a running case, and its motion."""
 
     def __init__(
         self,
@@ -97,10 +97,10 @@ class Spin:
         return state_at(self._begun, self._setup)
 
     def take(self, at: int, length: int, per_revolution: int, *, is_fixed: bool) -> Taken | None:
-        """Take a piece from sample `at`; None where it is too long, or the spin does not get so far.
+        """Integrate a piece from sample `at`; None where it is too long, or the spin does not reach its end.
 
-        `is_fixed`: it may not be shortened for the sake of accuracy. Nor is one of an odd number of samples,
-        which cannot be halved.
+        `is_fixed`: it is not shortened for accuracy. A piece with an odd number of samples is not either,
+        because it cannot be halved.
         """
         drive, inertia = self._drive, self._free.inertia
         turned = 2.0 * math.pi * length / per_revolution
@@ -208,10 +208,10 @@ class Spin:
         energies: Floats,
         rubbed: float,
     ) -> Taken:
-        """What a piece has yielded, revolution by revolution.
+        """Result of a piece, revolution by revolution.
 
-        Its times follow from the acceleration (rad/s^2) that was guessed, braking from the change of
-        the speed (rad/s) that its energy has brought.
+        Its times follow from the guessed acceleration (rad/s^2), braking from the change of the speed (rad/s)
+        by its energy.
         """
         n = max(length // per_revolution, 1)
         turned = 2.0 * math.pi * length / (n * per_revolution)
@@ -230,7 +230,7 @@ class Spin:
         return Taken(passed, lag, swing, times, work, braking, energies)
 
     def _change(self, given: float, before: float, after: float) -> float:
-        """Change of the speed, rad/s, by the energy given to the spin, J; NaN where it would turn back.
+        """Change of the speed, rad/s, by the energy given to the spin, J; NaN where it would reverse.
 
         `before` and `after` are momenta of the spin by the motion, kg m^2/s: `J W^2 / 2 + W P` grows by that
         energy.
@@ -241,7 +241,7 @@ class Spin:
         return -2.0 * lacking / (slope + math.sqrt(square)) if square > 0.0 and slope > 0.0 else math.nan
 
     def _after(self, acceleration: float, angle: float) -> float:
-        """Speed after an angle (rad) at an acceleration, rad/s; 0 where the spin does not get so far."""
+        """Speed after an angle (rad) at an acceleration, rad/s; 0 where the spin does not reach it."""
         return math.sqrt(max(self.speed**2 + 2.0 * acceleration * angle, 0.0))
 
     def _mean_torque(self, end_speed: float) -> float:
@@ -257,5 +257,5 @@ class Spin:
 
 
 def _is_uneven(rubbed: float, duration: float, length: int, per_revolution: int) -> bool:
-    """Whether a piece is too long for what its touches take from the speed, `UNEVEN` times, rad/s^2."""
+    """Whether a piece is too long for the deceleration by its touches, times `UNEVEN`, rad/s^2."""
     return rubbed * duration**2 > 12.0 * DRIVEN_LAG and SHORTEST * length > per_revolution

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
 WIDEST, NARROWEST = 0.5, 1e-4  # half of the range over the speed
 WIDEST_TABULATED = 0.16  # the same where bearings follow a table, not a straight line
-AT_ENDS = 2.0  # error at the ends of a range over its mean: it grows evenly from the middle
-ACCELERATION_SHARE = 0.05  # of these errors, by the acceleration, which may change at once
+AT_ENDS = 2.0  # error at the ends of a range over its mean: it is linear from the middle
+ACCELERATION_SHARE = 0.05  # of these errors, by the acceleration, which may change suddenly
 
 
 def held_range(
@@ -32,9 +32,10 @@ def held_range(
     """Half of the ranges of speeds, rad/s, and of accelerations, rad/s^2, over which matrices may be held.
 
     Held at their values in the middle of it, they shift the exponent l of a mode by `l' h` at its ends, with
-    `l' = w A' v` by the left and right eigenvectors of the system A. The response to the unbalance, `exp(i
-    W t)`, errs by that over `|i W - l|`; in a passage that takes the time `h / a` for half of the range, not
-    by more than that over `a / h`. Motions that ring by themselves err in their frequency by `l' h / l`.
+    `l' = w A' v` by the left and right eigenvectors of the system A. The response to the unbalance,
+    `exp(i W t)`, errs by that over `|i W - l|`; in a passage that takes the time `h / a` for half of the
+    range, not by more than that over `a / h`. Motions that ring by themselves err in their frequency by
+    `l' h / l`.
 
     Parameters
     ----------

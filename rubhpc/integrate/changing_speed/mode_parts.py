@@ -1,4 +1,4 @@
-"""Parts of contact modes that the spin speed leaves alone."""
+"""Parts of contact modes that do not depend on the spin speed."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def output_operators(reduced: ReducedModel) -> tuple[Floats, Floats, Floats]:
 
 
 def with_slip(row: ModeTables, slip: Complexes, exponent: Complexes) -> ModeTables:
-    """Tables of a mode, (1, ...), whose slip speeds (q, coordinates) and their rates are all of it."""
+    """Tables of a mode, (1, ...), with complete slip speeds (q, coordinates) and their rates."""
     end, width = exponent.size, row.slip_re.shape[-1]
     speed = np.zeros((1, len(slip), width), dtype=np.complex128)
     speed[0, :, :end] = slip
@@ -78,7 +78,7 @@ def with_slip(row: ModeTables, slip: Complexes, exponent: Complexes) -> ModeTabl
 
 
 def without_renewed(row: ModeTables, n_row: int) -> ModeTables:
-    """Tables of a mode, (1, ...), without what each speed renews; they have `n_row` outputs."""
+    """Tables of a mode, (1, ...), without the parts computed for each speed; they have `n_row` outputs."""
     width = row.motion_re.shape[-1]
     n_output = -(-SAMPLES_AT_ONCE * n_row // LANES) * LANES
     shapes = {"output": (1, 2 * width, n_output)} | {
@@ -99,22 +99,22 @@ def held_mode(
     springs: Springs,
     is_balanced: bool,
 ) -> HeldMode:
-    """What the spin speed leaves alone of a mode of m eigenmodes; its tables have a width.
+    """Speed-independent part of a mode of m eigenmodes; its tables have a width.
 
     Parameters
     ----------
     linear : Linear
-        What the set of states makes of the motion.
+        Linear maps of the set of states.
     slip : (q, n)
-        Slip speed with the motion of pairs that the switch functions do not hold.
+        Slip speed with the motion of pairs, unless the switch functions contain it.
     phasor : (n,), complex, kg m
         Unbalance at unit speed.
     output : (o, 3 n)
         `output_operators`, side by side.
     springs : Springs
-        Those that press.
+        The pressed ones.
     is_balanced : bool
-        Whether energies are asked for; without, nothing resists.
+        Whether energies are needed; otherwise there are no resisting forces.
     """
     m, n = mode.n_eigenmode, slip.shape[1]
     end = mode.exponent.size
@@ -124,7 +124,7 @@ def held_mode(
     position, velocity, acceleration = np.hsplit(output, 3)
     seen = position @ motion[:n] + velocity @ motion[n:]
     seen += (acceleration @ motion[n:]) * exponent
-    # An inverse shape times its shape is 2 where a mode stands for a conjugate pair, and is doubled.
+    # An inverse shape times its shape is 2 where a mode represents a conjugate pair, and is doubled.
     enter = mode.enter[:m]
     doubled = np.einsum("ka,ak->k", enter, mode.motion[:, :m]).real
     resistance, resisting = np.zeros((n, 2 * n)), np.zeros_like(motion[:n])

@@ -1,4 +1,4 @@
-"""A case that is taken piece after piece, each at its own speed, by one march."""
+"""Integration of a case piece after piece, each at its own speed, by one march."""
 
 from __future__ import annotations
 
@@ -32,27 +32,27 @@ Floats = NDArray[np.float64]
 
 
 class Passed(NamedTuple):
-    """What a piece has yielded."""
+    """Result of a piece."""
 
     whole: Floats  # (n_row, n_sample), about the sag, until the next piece
-    accumulators: list[Accumulator]  # of each revolution in it, or of the part of one that it is
+    accumulators: list[Accumulator]  # of each revolution in it, or of its part of a revolution
     n_step: int
     end: Place
-    gained: float  # mechanical energy, J; NaN where it was not asked for
-    reason: str  # why it could not go on, or ""
+    gained: float  # mechanical energy, J; NaN if not requested
+    reason: str  # why it could not continue, or ""
 
 
 class Passing:
-    """What takes the pieces of a case: one march that begins again at each of their speeds."""
+    """Integrates the pieces of a case by one march, which begins again at each of their speeds."""
 
     def __init__(self, clearance: float, friction: float, check: Callable[[], None] | None) -> None:
         self._case = clearance, friction
         self._check = check
         self._march: EventDrivenMarch | None = None
-        self._left: tuple[int, Floats] | None = None  # where the last piece has ended, in modes
-        self._lasted = 0.0  # s, that piece
-        self._room: dict[int, Samples] = {}  # by how many samples a piece has
-        self._at: PieceSetup | None = None  # the piece at whose beginning the march stands
+        self._left: tuple[int, Floats] | None = None  # end of the last piece, in modal coordinates
+        self._lasted = 0.0  # s, duration of that piece
+        self._room: dict[int, Samples] = {}  # by number of samples of a piece
+        self._at: PieceSetup | None = None  # the piece at whose beginning the march is
 
     def take(
         self,
@@ -64,17 +64,17 @@ class Passing:
         is_balanced: bool = False,
         goes_on: bool = False,
     ) -> Passed:
-        """Take one piece; `earlier` holds the contact forces before it, and how long ago they began, s.
+        """Integrate one piece; `earlier` has the contact forces before it, and how long ago they began, s.
 
-        `is_balanced`: its energies are asked for. `goes_on`: the piece before was taken too, with the same
-        acceleration, and matrices of the same range; or it is the first one, and no fast mode rings.
+        `is_balanced`: its energies are requested. `goes_on`: the piece before was integrated too, with the
+        same acceleration and matrices of the same range; or it is the first one, without ringing fast modes.
         """
         if self._check is not None:
             self._check()
         try:
             march = self._begin(setup, n_sample, begun, goes_on=goes_on)
             return self._pass(march, setup, n_sample, earlier, is_balanced)
-        except NoClosedForm:  # contacts that chatter: short steps need no events
+        except NoClosedForm:  # chattering contacts: short steps need no events
             self._march = None
             even = evenly_forced(setup, n_sample)
             steps = ContactSteppingMarch(even, *self._case, state_at(begun, setup), self._check)
@@ -83,9 +83,9 @@ class Passing:
     def continued(
         self, setup: PieceSetup, begun: State | Place, before: Standing | None, change: Change
     ) -> State | Place:
-        """Where a piece begins after another in other matrices, or at another acceleration that these follow.
+        """Start of a piece after one with other matrices, or at another acceleration that these follow.
 
-        What a curved gap adds follows the motion, which may not change while that is closed.
+        The height of a curved gap depends on the motion, which must not change while the gap is closed.
         """
         if self._march is None or before is None or not isinstance(begun, Place):
             return begun
@@ -96,7 +96,7 @@ class Passing:
         return carried(before, change, self._march, setup, begun)
 
     def standing(self, setup: PieceSetup, end: State | Place, n_sample: int) -> Standing | None:
-        """Where the piece that was taken last has ended, in its own modes, if it has some."""
+        """End of the last piece in its own modes, if it has any."""
         if self._march is None or not isinstance(end, Place):
             return None
         return standing(self._march, setup, end, setup.interval * n_sample)
@@ -111,7 +111,7 @@ class Passing:
         *,
         goes_on: bool = False,
     ) -> Stretch | None:
-        """Take pieces with the same matrices from `first` on, as many as the kernel can; None for none."""
+        """Integrate pieces with the same matrices from `first` on, as many as possible; None for none."""
         if self._march is None or not isinstance(begun, Place):
             return None
         if self._check is not None:
@@ -136,7 +136,7 @@ class Passing:
         return max(self._lasted, setup.interval * n_sample)
 
     def _begin(self, setup: PieceSetup, n_sample: int, begun: State | Place, *, goes_on: bool) -> ModalMarch:
-        """The march that stands where a piece begins."""
+        """The march at the beginning of a piece."""
         march, at, self._at = self._march, self._at, None
         if march is not None and isinstance(begun, Place):
             if at is setup:
@@ -159,7 +159,7 @@ class Passing:
         return made
 
     def _keep_fast(self, march: EventDrivenMarch, setup: PieceSetup, n_sample: int) -> None:
-        """Let fast modes that follow the speed go on as they were."""
+        """Let fast modes that follow the speed continue unchanged."""
         library = march.library
         if self._left is not None and isinstance(library, RetunedLibrary) and library.follows(march.mask):
             march.keep_fast(self._left, setup.spin, self._longer(setup, n_sample))
@@ -198,7 +198,7 @@ class Passing:
 
 
 def evenly_forced(setup: PieceSetup, n_sample: int) -> PieceSetup:
-    """The set-up of a piece whose unbalance force keeps its size in the middle, for short steps."""
+    """The set-up of a piece with a constant unbalance force, that of its middle, for short steps."""
     growth = setup.clock.growth
     grown = math.exp(0.5 * growth * setup.interval * n_sample)
     return with_values(
@@ -210,7 +210,7 @@ def evenly_forced(setup: PieceSetup, n_sample: int) -> PieceSetup:
 
 
 def state_at(begun: State | Place, setup: PieceSetup) -> State:
-    """The motion where a piece begins, in the degrees of its bodies."""
+    """The motion at the beginning of a piece, in the degrees of its bodies."""
     if isinstance(begun, State):
         return begun
     displacement, velocity = (setup.reduced.basis @ begun.motion.reshape(2, -1).T).T.copy()
@@ -219,7 +219,7 @@ def state_at(begun: State | Place, setup: PieceSetup) -> State:
 
 
 def energy_of(begun: Place, setup: PieceSetup) -> float:
-    """Mechanical energy, J, of the motion where a piece begins, about its sag."""
+    """Mechanical energy, J, of the motion at the beginning of a piece, about its sag."""
     (displacement, velocity), moved = begun.motion.reshape(2, -1), begun.sag - setup.model.sag
     displacement = displacement + setup.reduced.project[:, : moved.size] @ moved
     return float(0.5 * (velocity @ velocity + displacement @ setup.reduced.stiffness @ displacement))

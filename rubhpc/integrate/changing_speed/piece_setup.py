@@ -41,15 +41,15 @@ D = TypeVar("D")
 
 
 class HeldMatrices:
-    """Matrices at a speed, rad/s, and an acceleration, rad/s^2, and what has been solved of them.
+    """Matrices at a speed, rad/s, and an acceleration, rad/s^2, with their solved contact modes.
 
     `momentum` (n, n) is the change of the stiffness with the acceleration, per rad/s^2. `beside` are the
-    model and its matrices at other speeds of the range (`followed_modes.NODES`), through which they
-    follow the speed; none where they stay what they are. `judge` says which accelerations they follow.
+    model and its matrices at other speeds of the range (`followed_modes.NODES`), through which they follow
+    the speed; none where they are constant. `judge` decides which accelerations they follow.
     """
 
-    template: PieceSetup  # of which a piece has another speed
-    is_balanced = True  # whether energies are asked for
+    template: PieceSetup  # set-up to copy for the speed of a piece
+    is_balanced = True  # whether energies are requested
 
     def __init__(
         self,
@@ -68,23 +68,23 @@ class HeldMatrices:
         self._judge = judge
         self._desks, self._beside = desks, beside
         self.model, self.reduced = model, reduced
-        self.at_hand = reduced  # at the speed of the piece under way
+        self.at_hand = reduced  # at the speed of the current piece
         self.twist = self.lean = np.zeros(model.sag.size)  # sag under 1 N m of a drive; under 1 rad/s^2
-        self.sags: list[Floats] = []  # at the same speeds, where they go with the speed
+        self.sags: list[Floats] = []  # at the same speeds, where they depend on the speed
         self.kept = KeptParts()
-        self.bodies: dict[float, Reduced] = {}  # of each friction, but for what a piece changes
+        self.bodies: dict[float, Reduced] = {}  # of each friction, without what a piece changes
         self.sample_level = sample_level  # of the lowest speed
         self.acceleration, self.momentum = acceleration, momentum
         self._phasor, self._reach = phasor, reach
         self._slope = slope  # N m s, of a drive's torque over the speed
         self._libraries: dict[tuple[str, float], RetunedLibrary] = {}
         self._pairs: dict[float, FrictionPairs] = {}
-        self._latest: tuple[tuple[float, ...], Model] | None = None  # by what was asked
+        self._latest: tuple[tuple[float, ...], Model] | None = None  # by request
         self.first: tuple[tuple[float, ...], object] | None = None  # block of a case, by what was asked
 
     @property
     def n_byte(self) -> int:
-        """Memory that tables of contact modes hold."""
+        """Memory of the tables of contact modes, bytes."""
         return sum(library.n_byte for library in self._libraries.values())
 
     def serve(self, speed: float, acceleration: float, slope: float = 0.0) -> bool:
@@ -99,7 +99,7 @@ class HeldMatrices:
 
     @cached_property
     def risen(self) -> ReducedModel | None:
-        """The matrices in the middle of the range at another acceleration, with which they go too."""
+        """The matrices in the middle of the range at another acceleration, which they follow too."""
         change = self._judge.rise if self._judge and self._beside else 0.0
         if not change:
             return None
@@ -123,7 +123,7 @@ class HeldMatrices:
         return bool(self._beside)
 
     def within(self, speed: float) -> float:
-        """Place of a speed (rad/s) in the range, from -1 to 1; 0 where nothing goes with it."""
+        """Place of a speed (rad/s) in the range, from -1 to 1; 0 where the matrices are constant."""
         return (speed - self.reduced.spin) / self.reach if self._beside else 0.0
 
     def at_place(self, within: float, rise: float) -> ReducedModel:
@@ -137,7 +137,7 @@ class HeldMatrices:
 
     @cached_property
     def _at_nodes(self) -> dict[str, list[Floats]]:
-        """What of the model goes with the speed, at `followed_modes.NODES`."""
+        """Arrays of the model that depend on the speed, at `followed_modes.NODES`."""
         nodes = [self.reduced, *(reduced for _, reduced in self._beside)]
         return {name: [getattr(node, name) for node in nodes] for name in ("stiffness", "damping", "probe")}
 
@@ -157,7 +157,7 @@ class HeldMatrices:
     def tuned(
         self, kind: type[R], piece: PieceSetup, friction: float, make: Callable[[], dict[str, Any]]
     ) -> R:
-        """Contact modes of a friction, tuned to a piece; `make` gives what this kind of library asks for."""
+        """Contact modes of a friction, tuned to a piece; `make` returns the arguments of the library."""
         key = kind.__name__, friction
         if key not in self._libraries:
             if any(known != friction for _, known in self._libraries):  # of earlier cases
@@ -192,7 +192,7 @@ class HeldMatrices:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PieceSetup(ModalSetup):
-    """A set-up at the speed of a piece, whose matrices are those of other pieces too."""
+    """A set-up at the speed of a piece, whose matrices are shared with other pieces."""
 
     held: HeldMatrices
     speeds: Speeds  # of this piece and of others that have the same matrices
@@ -206,7 +206,7 @@ class PieceSetup(ModalSetup):
 
     @cached_property
     def sample_level(self) -> int:
-        """2^sample_level ticks are the interval of samples, at all speeds of the same matrices."""
+        """Samples are 2^sample_level ticks apart, at all speeds of the same matrices."""
         return self.held.sample_level
 
     @property
@@ -215,7 +215,7 @@ class PieceSetup(ModalSetup):
         return float(self.speeds.within[self.place]), float(self.speeds.rise[self.place])
 
     def goes_on_in(self, other: PieceSetup, acceleration: float, next_acceleration: float) -> bool:
-        """Whether another piece, after this one, has matrices that follow the speed as these do."""
+        """Whether the next piece has matrices of the same range that follow the speed."""
         return other.held is self.held and self.held.is_followed and next_acceleration == acceleration
 
     @property
@@ -232,7 +232,7 @@ class PieceSetup(ModalSetup):
         return self.held.kept
 
     def bodies(self, friction: float, clearance: Floats) -> Reduced:
-        """The reduced bodies of a case as kernels take them; clearance (q,), m."""
+        """The reduced bodies of a case for kernels; clearance (q,), m."""
         known = self.held.bodies
         made = known.get(friction)
         if made is None:
@@ -252,17 +252,17 @@ class PieceSetup(ModalSetup):
         return of_pieces
 
     def _overlap(self, made: Reduced, clearance: Floats) -> float:
-        """Overlap, m, that modes which follow the speed may leave as a pair opens, and that is no event."""
+        """Overlap, m, that modes which follow the speed may leave as a pair opens, without an event."""
         if not self.held.is_followed or made.spring:
             return made.overlap
         return float(self.accuracy * clearance[: len(self.model.stators)].min())
 
     def library(self, friction: float) -> ModeLibrary:
-        """Contact modes of a friction, which serve until another piece asks for them."""
+        """Contact modes of a friction, valid until another piece requests them."""
         return self.held.tuned(RetunedLibrary, self, friction, dict)
 
     def curved_library(self, friction: float) -> CurvedLibrary:
-        """The same with what curved gaps need."""
+        """The same with tables for curved gaps."""
         held = self.held
 
         def at_piece() -> dict[str, Any]:
@@ -288,7 +288,7 @@ class PieceSetup(ModalSetup):
         return with_values(pairs, rim_speed=radius * abs(self.spin))
 
     def friction_library(self, friction: float) -> ModeLibrary:
-        """Contact modes of a friction whose slip may turn."""
+        """Contact modes of a friction whose slip may reverse."""
 
         def pairs() -> dict[str, Any]:
             radius = np.array([stator.radius for stator in self.model.stators])
@@ -300,7 +300,7 @@ class PieceSetup(ModalSetup):
 
 
 def with_values(instance: D, **values: Any) -> D:
-    """The same with other values, and with what has been computed of it: `replace` at a tenth of its time."""
+    """A copy with other values that keeps cached properties: `replace` in a tenth of the time."""
     other = object.__new__(type(instance))
     other.__dict__.update(instance.__dict__, **values)
     return other

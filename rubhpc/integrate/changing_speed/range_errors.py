@@ -1,6 +1,6 @@
-"""What signals err by where contact modes follow the speed: against the matrices themselves.
+"""Errors of signals where contact modes follow the speed, compared with the matrices.
 
-They are held by what unbalance and forces on the rotor at its contacts make of every signal.
+They are the errors of the response of every signal to unbalance and to forces at the contacts.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ if TYPE_CHECKING:
     Matrices = Callable[[float], tuple[Floats, Floats]]  # stiffness and damping at a speed, rad/s
 
 PASSING = 0.01  # growth over the speed, 1/rad, at which a passage meets a resonance
-STRUCK = 0.1  # the same of motions that contacts excite, which they strike again and again
-ORDERS, HIGHEST = 0.5, 16.0  # of the speed: between frequencies at which these are judged, and at most
-PLACES = -1.0, -0.8, -0.4, 0.4, 0.8, 1.0  # between those of the modes, where a range is judged
+STRUCK = 0.1  # the same for motions that contacts excite repeatedly
+ORDERS, HIGHEST = 0.5, 16.0  # of the speed: step and end of the frequencies at which these are tested
+PLACES = -1.0, -0.8, -0.4, 0.4, 0.8, 1.0  # between those of the modes, where a range is tested
 
 
 class Rotor(NamedTuple):
-    """What moves with the speed's matrices, in reduced degrees, as signals and forces see it."""
+    """Degrees whose matrices depend on the speed, reduced, with signals and forces."""
 
     matrices: Matrices
     phasor: Complexes  # (n,), unbalance
     force: Floats  # (n_force, n), unit forces of contacts
-    seen: Floats  # (3, n_signal, n), what signals see of displacements, velocities and accelerations
-    top: float  # rad/s, frequency up to which signals are to be met
+    seen: Floats  # (3, n_signal, n), weights of displacements, velocities and accelerations
+    top: float  # rad/s, frequency up to which signals must be accurate
 
 
 def signal_error(
@@ -55,13 +55,13 @@ def signal_error(
 
 
 def leak(shapes: list[Complexes], speed: float) -> float:
-    """What a motion gains or loses, over it, as it enters shapes by what stands for their inverse."""
+    """Relative change of a motion that enters shapes by the interpolated inverse."""
     inverses = inverses_of(shapes)
     return max(lost_by(between(shapes, place), between(inverses, place), speed) for place in JUDGED)
 
 
 def inverses_of(shapes: list[Complexes]) -> list[Complexes]:
-    """Inverses at `EXACT` of what goes through shapes."""
+    """Inverses at `EXACT` of the interpolated shapes."""
     return [inverse_of(between(shapes, place)) for place in EXACT]
 
 
@@ -71,7 +71,7 @@ def inverse_of(shape: Complexes) -> Complexes:
 
 
 def lost_by(shape: Complexes, entered: Complexes, speed: float) -> float:
-    """What a motion gains or loses, over it, as it enters shapes (2 n, 2 n) by their inverse."""
+    """Relative change of a motion that enters shapes (2 n, 2 n) by `entered`."""
     n = len(shape)
     scale = np.repeat([speed, 1.0], n // 2)
     off = (shape @ entered - np.eye(n)) * scale[:, np.newaxis] / scale

@@ -1,10 +1,10 @@
-"""What the pieces of a run-up leave of the unbalance force, and how long they may be for its sake.
+"""Sidebands of the unbalance force by the pieces of a run-up, and the allowed length of pieces.
 
-Within a piece of the duration T at a constant speed the shaft's angle is off by a parabola of mean zero, from
-`lag = a T^2 / 12` at both ends to `-lag / 2` in the middle. Pieces of equal length repeat it: beside the
-force at the speed W stand those at `W +- k D`, `D = 2 pi / T`, each `3 lag / (pi k)^2` times as large. A
-signal errs by what it has of these over what it has of the force itself, which is much where one of them
-meets a resonance, or where a node hardly moves at W.
+Within a piece of duration T at constant speed the error of the shaft's angle is a parabola with mean zero,
+from `lag = a T^2 / 12` at both ends to `-lag / 2` in the middle. Pieces of equal length repeat it. Besides
+the force at the speed W there are forces at `W +- k D`, `D = 2 pi / T`, each `3 lag / (pi k)^2` times as
+large. The error of a signal is its response to these over its response to the force itself. It is large where
+a sideband meets a resonance, or where a node hardly moves at W.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ if TYPE_CHECKING:
     Complexes = NDArray[np.complex128]
     Ints = NDArray[np.int64]
 
-SIDEBANDS, HIGHEST = 3, 2.0  # on either side at least, and up to this multiple of the speed away
-SHARE = 0.75  # of the accuracy asked for, by which a signal may err in its 1X
-NEXT_SPEED = 0.02  # of a speed, to the next one for which pieces are judged
-STILL = 1e-12  # of the largest degree, below which one is not moved
+SIDEBANDS, HIGHEST = 3, 2.0  # on either side: least number, and largest distance over the speed
+SHARE = 0.75  # of the requested accuracy: error of a signal in its 1X
+NEXT_SPEED = 0.02  # relative step between speeds for which pieces are assessed
+STILL = 1e-12  # of the largest degree; a smaller one counts as unmoved
 PASSING = 0.01  # growth over the speed, 1/rad, at which a passage meets a resonance
 LEAST = LAG / 64.0  # rad, for signals of nodes that do not move with the shaft
-PROMISED = 5e-3  # error of a signal without contact, relative, beyond which a case says so
+PROMISED = 5e-3  # relative error of a signal without contact, above which a case warns
 
 
 class Linear(NamedTuple):
@@ -66,7 +66,7 @@ class Linear(NamedTuple):
 
 
 class Ripples:
-    """How much the shaft may lag within the pieces of a run-up.
+    """Allowed lag of the shaft within the pieces of a run-up.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class Ripples:
         self._cuts: dict[tuple[SpeedLaw, int, int | None], Ints] = {}
 
     def allowed(self, speed: float, turns: float) -> float:
-        """Lag (rad) of a piece at a speed, rad/s, that takes so many revolutions."""
+        """Allowed lag (rad) of a piece at a speed, rad/s, over so many revolutions."""
         error = self._per_lag(speed, turns).max(initial=0.0) / (SHARE * self._accuracy)
         return max(LAG / max(LAG * float(error), 1.0), LEAST)
 
@@ -95,7 +95,7 @@ class Ripples:
         return self._cuts[asked]
 
     def advice(self, speed: Floats, turns: Floats, lag: Floats, names: Sequence[str]) -> str:
-        """What to do where pieces, (n,) each, are too long for a signal; "" where they are not.
+        """Advice where pieces, (n,) each, are too long for a signal; else "".
 
         `names` are those of the signals, `lag` (rad) that of the pieces.
         """
@@ -111,7 +111,7 @@ class Ripples:
         )
 
     def _per_lag(self, speed: float, turns: float) -> Floats:
-        """Relative error of each signal over the lag, 1/rad; 0 for those that the unbalance leaves alone."""
+        """Relative error of each signal over the lag, 1/rad; 0 for those that unbalance does not excite."""
         place = round(math.log(speed) / NEXT_SPEED)
         if (place, turns) not in self._errors:
             self._errors[place, turns] = self._error(place, turns)

@@ -1,11 +1,11 @@
 """A case whose spin speed changes: pieces of constant speed, each in closed form.
 
-With the angle phi of the shaft, the unbalance acts as `Re[p (phi'^2 - i phi'') exp(i phi)]`, p being its
-phasor at unit speed; a disc whose spin momentum follows its tilt needs `phi'' G u` besides `phi' G u'`; and
-the inertia of the shaft twists it by the static response to `-phi'' J`. The angle is exact at the ends of a
-piece. Within it, of the duration T, it lags at the time s behind that of the steady spin between these ends
-by `phi'' s (T - s) / 2`: the mean, `phi'' T^2 / 12`, is taken off the phase, so that what is left
-alternates. The error falls with the square of the piece.
+With the angle phi of the shaft, the unbalance force is `Re[p (phi'^2 - i phi'') exp(i phi)]`, where p is its
+phasor at unit speed. A disc whose spin momentum follows its tilt needs `phi'' G u` in addition to
+`phi' G u'`. The inertia of the shaft twists it by the static response to `-phi'' J`. The angle is exact at
+the ends of a piece. Within a piece of duration T, at the time s, it differs from that of the steady spin
+between these ends by `phi'' s (T - s) / 2`. The mean, `phi'' T^2 / 12`, is subtracted from the phase, so that
+the rest alternates. The error is proportional to the square of the length of pieces.
 """
 
 from __future__ import annotations
@@ -44,14 +44,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RunUp:
-    """What a run-up has yielded, revolution by revolution.
+    """Result of a run-up, revolution by revolution.
 
     Attributes
     ----------
     reason : str
         Why it ended early; "" where it did not.
     advice : str
-        What to do where its pieces are too long for a signal; "" where they are not.
+        Advice where its pieces are too long for a signal; else "".
     whole : (n_row, n_sample)
         Samples as `Samples.whole`, locked to the shaft.
     speed : (n_revolution,), rad/s
@@ -61,7 +61,7 @@ class RunUp:
     contact_fraction, peak_contact_force, friction_work : (n_revolution, n_stator)
         Of each revolution; 1, N and J.
     together : Accumulator
-        What all revolutions have gathered of their contacts.
+        Contacts of all revolutions.
     n_step : int
     final : State
     """
@@ -98,8 +98,8 @@ def integrate_run_up(
     clearance : float, m
     friction : float
     pieces_per_revolution : int, optional
-        Into how many pieces of constant speed every revolution is cut, a divisor of the samples in it; by
-        default as the change of speed asks for (`speed_law.cut`).
+        Number of pieces of constant speed per revolution, a divisor of its samples; by default as the change
+        of speed requires (`speed_law.cut`).
     check : callable, optional
         Called between kernel calls; what it raises ends the run-up.
     """
@@ -116,22 +116,22 @@ def integrate_run_up(
     reached: State | Place | None = initial if isinstance(initial, State) else None
     n_step, reason, n_done = 0, "", n
     earlier = new_accumulator(n_stator, model.n_place)
-    sagging, begun = model, 0  # whose sag the samples from there on are about
+    sagging, begun = model, 0  # reference sag of the samples from there on
     durations, sizes = np.diff(times), np.diff(cuts)
     before = np.concatenate([[0.0], durations[:-1]])
     speeds: Floats = np.diff(angles) / durations
-    # A piece in which the law bends has a mean acceleration, which leaves the shaft behind by `late`, rad.
+    # A piece in which the law bends has a mean acceleration, with which the shaft lags by `late`, rad.
     within = np.floor(bends := law.bends(per_revolution))
     bent = np.searchsorted(cuts[:-1], within[(within < bends) & (within < cuts[-1])])
     accelerations[bent] = np.diff(at_cuts)[bent] / durations[bent]
     late, sudden = np.zeros((2, speeds.size))
     sudden[bent] = accelerations[bent] - law.at_angle(angles[bent])[2]  # past its first sample
     late[bent] = ((speeds - 0.5 * (at_cuts[1:] + at_cuts[:-1])) * durations)[bent]
-    is_even = sizes > 1  # those of a sample are around a bend
+    is_even = sizes > 1  # pieces of one sample are around a bend
     lag = (accelerations * durations**2 / 12.0)[is_even]
     advice = pieces.ripples.advice(speeds[is_even], sizes[is_even] / per_revolution, lag, signal_names(model))
     unit, none = unit_rotation(model.rotor), np.zeros(model.rotor.n_dof)
-    piece, held_from = 0, times[0]  # since when the matrices are held
+    piece, held_from = 0, times[0]  # time from which the matrices are held
     last: tuple[PieceSetup, int] | None = None  # piece of the matrices before, and its samples
     for block in pieces.blocks(speeds, accelerations, angles[:-1], durations, sizes):
         setup, size, begins_at = block[0], int(sizes[piece]), piece
@@ -148,7 +148,7 @@ def integrate_run_up(
             and (last[0].held is not setup.held or setup.held.is_followed)
         ):
             ended = passing.standing(last[0], reached, last[1])
-            # What an acceleration that jumps leaves to ring is no work of the matrices.
+            # Ringing by a jump of the acceleration is not caused by the matrices.
             jump = float(accelerations[piece] - accelerations[piece - 1])
             change = Change(times[piece] - held_from, durations[piece], jump)
             leant = jump * setup.held.lean
@@ -179,7 +179,7 @@ def integrate_run_up(
                 continue
             passed = passing.take(block[place], size, reached, before_it, goes_on=follows)
             reached, earlier = passed.end, passed.accumulators[-1]
-            if late[piece]:  # the inertia of the twist does not follow at once
+            if late[piece]:  # the inertia of the twist does not follow immediately
                 seen = model.probe_rows[2, :, : unit.size] @ unit
                 passed.whole[4 + 3 * model.n_place :, 0] += sudden[piece] * seen
                 reached = moved(reached, block[place], -late[piece] * unit, none)
@@ -201,7 +201,7 @@ def integrate_run_up(
     swing = np.diff(at_cuts) / (at_cuts[1:] + at_cuts[:-1])
     bring_to_angles(whole[:, :n_sample], swing, taken, model.n_place)
     gathered.sum_up()
-    assert reached is not None  # a law has a whole revolution at least
+    assert reached is not None  # a law has at least one revolution
     turns = np.diff(begins)[:n_done]
     return RunUp(
         reason=reason,
@@ -219,12 +219,12 @@ def integrate_run_up(
 
 
 def is_contact_free(initial: Initial, begun: State) -> bool:
-    """Whether a case begins in the contact-free motion itself, with no disturbance or stator pushed aside."""
+    """Whether a case begins in the contact-free motion itself, without disturbance or removed overlap."""
     moved = (*begun.stator_displacement, begun.contact_force)
     return initial.from_ == CONTACT_FREE and not initial.is_disturbed and not any(m.any() for m in moved)
 
 
 def signal_names(model: Model) -> list[str]:
-    """Names of what `Pieces.ripples` judge: the disc's displacements and the probes."""
+    """Names of the signals of `Pieces.ripples`: the disc's displacements and the probes."""
     probes = () if model.probe is None else model.probe.probes
     return ["vertical", "horizontal", *(f"probe {probe.name}" for probe in probes)]

@@ -1,7 +1,7 @@
 """Samples at fixed angles of a shaft whose speed changes within a piece.
 
-A piece is sampled at even times. At the acceleration a the shaft is there behind the even angles, by up to
-`a T^2 / 8`, and comes to them later.
+A piece is sampled at even times. At the acceleration a the shaft then lags the even angles by up to
+`a T^2 / 8`, and reaches them later.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 
 def bring_to_angles(whole: Floats, swing: Floats, cuts: Ints, n_place: int) -> None:
-    """Bring samples (`Samples.whole`) to the angles of the shaft that they are meant for, in place.
+    """Resample (`Samples.whole`) at the intended angles of the shaft, in place.
 
-    Contact forces, which are means over the intervals, stay.
+    Contact forces, which are means over the intervals, are not changed.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 
 
 class Stretch(NamedTuple):
-    """What pieces have yielded, one after the other."""
+    """Results of consecutive pieces."""
 
     n_piece: int
     whole: Floats  # (n_row, n_sample), about the sag
@@ -33,7 +33,7 @@ class Stretch(NamedTuple):
     last: Accumulator  # of the last part
     n_step: int
     end: Place
-    left: tuple[int, Floats]  # where the last piece has ended, as of `EventDrivenMarch.reached_in`
+    left: tuple[int, Floats]  # end of the last piece, as in `EventDrivenMarch.reached_in`
 
 
 def begin_stretch(
@@ -43,7 +43,7 @@ def begin_stretch(
     since: float,
     left: tuple[int, Floats] | None = None,
 ) -> RetunedLibrary | None:
-    """Begin a piece, with others to follow in the same kernel call; None where it is to be taken by itself.
+    """Begin a piece, to be continued in the same kernel call; None where it must be integrated alone.
 
     It has begun either way, but where the march is none that takes several (`has_piece_loop`). `left` is
     where the piece before has ended (`EventDrivenMarch.reached_in`), of modes that follow the speed, `since`
@@ -67,7 +67,7 @@ def take_stretch(
     earlier: tuple[Accumulator, float],
     check: Callable[[], None] | None,
 ) -> Stretch | None:
-    """Take the pieces from `first` on, as far as nothing stands against it; None where that is nowhere.
+    """Integrate the pieces from `first` on, as far as possible; None where that is not possible.
 
     Parameters
     ----------

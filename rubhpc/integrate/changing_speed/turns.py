@@ -1,4 +1,4 @@
-"""Contact measures of a record with a changing speed: of each revolution, and of the whole record."""
+"""Contact measures of a record with a changing speed: for each revolution and for the whole record."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MOST_WAITING = 128  # revolutions that are added at once
 
 
 class Turns:
-    """Contact of each revolution, and what a whole record has of it.
+    """Contact of each revolution and of a whole record.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class Turns:
     together : Accumulator
         Sums and extrema of all revolutions.
 
-    They hold what was added before the last call of `sum_up`.
+    They contain what was added before the last call of `sum_up`.
     """
 
     def __init__(self, n: int, model: Model) -> None:
@@ -43,13 +43,13 @@ class Turns:
         self._waiting: list[tuple[int, Accumulator]] = []
 
     def add(self, turn: int, accumulator: Accumulator) -> None:
-        """Add what a revolution, or a part of one, has gathered."""
+        """Add the accumulator of a revolution, or of a part of one."""
         self._waiting.append((turn, accumulator))
         if len(self._waiting) == MOST_WAITING:
             self.sum_up()
 
     def sum_up(self) -> None:
-        """Add what waits to be added."""
+        """Add the waiting accumulators."""
         if not self._waiting:
             return
         turns, accumulators = zip(*self._waiting, strict=True)
@@ -59,7 +59,7 @@ class Turns:
         self._add(list(turns), new)
 
     def add_all(self, turns: Ints, sums: Accumulator) -> None:
-        """Add what parts of a record have gathered, (n,) revolutions and (n, ...) sums."""
+        """Add accumulators of parts of a record: (n,) revolutions and (n, ...) sums."""
         self._add(turns, sums._asdict())
 
     def _add(self, at: Any, new: dict[str, Any]) -> None:
@@ -79,10 +79,10 @@ class Turns:
 def contact_measures(
     together: Accumulator, whole: Floats, n_revolution: int, model: Model, *, is_round: bool
 ) -> dict[str, Any]:
-    """Measures of the contacts of a whole record, as those of a constant speed are (`measures_of`).
+    """Measures of the contacts of a whole record, as at constant speed (`measures_of`).
 
-    `together` is what all revolutions have gathered, `whole` their samples (`Samples.whole`), `is_round`
-    whether the gap knows that the rim is round.
+    `together` is the accumulator of all revolutions, `whole` their samples (`Samples.whole`), `is_round`
+    whether the gap includes the roundness of the rim.
     """
     has_touched, stators = together.impulse > 0.0, model.stators
     samples = empty_samples(model.n_place, whole.shape[1], model.n_probe)

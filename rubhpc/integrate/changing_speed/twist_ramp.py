@@ -1,4 +1,4 @@
-"""The twist of the shaft under a drive whose torque changes evenly within a piece."""
+"""The twist of the shaft under a drive whose torque changes linearly within a piece."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ Floats = NDArray[np.float64]
 
 
 class TwistRamp(NamedTuple):
-    """How the sag of the rotor moves within a piece: that of its set-up is the one in its middle.
+    """Change of the rotor's sag within a piece; the sag of its set-up is that in its middle.
 
-    A piece takes the motion about this sag. An even ramp has no inertia, so that the motion about it follows
-    the same equations but for what damping draws from its rate, which is left out.
+    The motion of a piece is about this sag. A linear ramp has no inertia force, so that the motion about it
+    follows the same equations, except for the damping force of its rate, which is omitted.
     """
 
     half: Floats  # (n_rotor_dof,), from the middle of the piece to its end, m and rad

@@ -27,11 +27,11 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 FIRST_STEPS = 20_000  # of the first kernel call
-N_START = 4  # passes for the normals of the first step; each gains five digits
+N_START = 4  # iterations for the normals of the first step; each gains five digits
 
 
 class CentralDifferenceMarch(March):
-    """The kernel's state, and how many steps it has taken."""
+    """A case by the paper's central difference."""
 
     def __init__(
         self,
@@ -61,7 +61,7 @@ class CentralDifferenceMarch(March):
         self._reached = np.zeros(1, dtype=np.int64)
 
     def touching(self) -> NDArray[np.bool_]:
-        """Which pairs pressed in the last step, (q,)."""
+        """Whether each pair was pressed in the last step, (q,)."""
         return self._work.force > 0.0
 
     def energy(self) -> float:
@@ -157,7 +157,7 @@ def _start(setup: CentralDifferenceSetup, initial: State, pairs: Pairs, work: Wo
     work.force[:] = initial.contact_force
     is_free = packed.degree_row >= 0
     free_force = packed.force[0] - packed.stiffness @ displacement - packed.damping @ velocity
-    # The step's forces act along the normals at its free update, and that depends, if little, on them.
+    # The forces of a step act along the normals of its free update, which depends slightly on them.
     for _ in range(N_START if setup.is_updated else 1):
         force = free_force.copy()
         np.add.at(

@@ -1,4 +1,4 @@
-"""Which march follows a law from event to event."""
+"""The event-driven march of each law."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _MARCHES: WeakKeyDictionary[ModalSetup, type[EventDrivenMarch]] = WeakKeyDiction
 
 
 def closed_form_march(setup: ModalSetup) -> type[EventDrivenMarch]:
-    """Return the march whose pairs have the states of a set-up's law."""
+    """Return the event-driven march for a set-up's law."""
     if setup not in _MARCHES:
         _MARCHES[setup] = _march_of(setup.law)
     return _MARCHES[setup]

@@ -1,4 +1,4 @@
-"""Sets of closed contacts of a case, and what an event makes of one: what periodic motions ask of a march."""
+"""Sets of closed contacts of a case and their change at an event: the interface for periodic motions."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 class ContactSets(ModalMarch):
-    """A case that stands in one set of closed contacts, or of states of its pairs, after another."""
+    """A case that passes through sets of closed contacts, or of states of its pairs."""
 
     take_change: ClassVar[Callable[..., int]] = staticmethod(change_contacts)  # kernel that takes an event
 
@@ -38,23 +38,23 @@ class ContactSets(ModalMarch):
 
     @property
     def mask(self) -> int:
-        """Set of closed pairs in which the case stands, or of the states of all under set-valued friction."""
+        """Present set of closed pairs, or of the states of all pairs under set-valued friction."""
         return int(self.tables.mask[self._bare_progress["mode"]])
 
     def moved_by(self, mask: int) -> int:
-        """What of a set of contacts decides how the bodies move: all of it, but whether pairs are lifted."""
+        """Part of a set of contacts that determines the motion: all but the bits of lifted pairs."""
         return mask
 
     def touching(self) -> NDArray[np.bool_]:
-        """Which pairs are closed, (q,)."""
+        """Whether each pair is closed, (q,)."""
         return self.closed(self.mask)
 
     def closed(self, mask: int) -> NDArray[np.bool_]:
-        """Which pairs are closed in a contact mode, (q,)."""
+        """Whether each pair is closed in a contact mode, (q,)."""
         return np.array([bool(mask >> i & 1) for i in range(self._clearance.size)])
 
     def opened(self, mask: int) -> NDArray[np.bool_]:
-        """Which pairs are open in a contact mode, and watched for their gap, (q,)."""
+        """Whether each pair is open in a contact mode, with its gap monitored, (q,)."""
         return ~self.closed(mask)
 
     def gaps_watched(self, mask: int) -> int:
@@ -64,7 +64,7 @@ class ContactSets(ModalMarch):
 
     @cached_property
     def given(self) -> Floats:
-        """Normal impulses and tractions (2, q), N s, of the last event that was taken by itself."""
+        """Normal and tangential impulses (2, q), N s, of the last event by `change`."""
         return np.zeros((2, self._clearance.size))
 
     def forces(self, mode: int, z: Floats) -> Floats:
@@ -78,7 +78,7 @@ class ContactSets(ModalMarch):
 
     @property
     def derived(self) -> dict[int, Any]:
-        """What is kept of the contact modes as long as their tables are (`ModeLibrary.derived`)."""
+        """Derived data of the contact modes, kept with their tables (`ModeLibrary.derived`)."""
         return self.library.derived
 
     @property
@@ -89,10 +89,10 @@ class ContactSets(ModalMarch):
     def change(
         self, mask: int, crossing: int, angle: float, motion: Floats, moment: float | None = None
     ) -> int:
-        """Take an event: `motion` (2 n,) after it, in place, and the contact mode that goes on, or -1.
+        """Compute an event: `motion` (2 n,) after it, in place; returns the contact mode afterwards, or -1.
 
         `crossing` are the switch functions that vanish, `angle` (rad) is that of the shaft; `moment` (s) is
-        `self.moment` where it is not given.
+        by default `self.moment`.
         """
         force, *room = self.change_work
         return int(
@@ -114,12 +114,12 @@ class ContactSets(ModalMarch):
 
     @cached_property
     def change_work(self) -> tuple[Floats, Floats, NDArray[np.bool_], Floats, Accumulator]:
-        """Work space of an event that is taken by itself (`change_contacts`)."""
+        """Work space of `change` (`change_contacts`)."""
         q = self._clearance.size
         room = np.zeros(q), np.zeros(q), np.zeros(q, dtype=np.bool_), np.zeros((q, q + 1))
         return *room, self._unrecorded
 
     @cached_property
     def _unrecorded(self) -> Accumulator:
-        """What is asked for where nothing is recorded."""
+        """Accumulator for events that are not recorded."""
         return new_accumulator(self._clearance.size)

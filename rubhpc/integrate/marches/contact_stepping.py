@@ -48,7 +48,7 @@ class ContactSteppingMarch(ModalMarch):
         q = self._clearance.size
         step = self.clock.tick * 2**self._impulses.level
         degree = setup.reduced.degree.reshape(q * N_DEGREE, -1)
-        # Displacement a contact step after a unit force has acted over it: an impulse, then drift.
+        # Displacement one contact step after a unit force over that step: an impulse, then free motion.
         drifted = step * (
             self._impulses.degree_re @ self._impulses.drifted_re.T
             - self._impulses.degree_im @ self._impulses.drifted_im.T
@@ -69,10 +69,10 @@ class ContactSteppingMarch(ModalMarch):
         self._work = workspace(self._pairs, step)
         self._ends = np.full((4, q * N_DEGREE), np.nan)
         self._placed = np.zeros((2, self.bodies.stiffness.shape[0]))
-        self._work.force[:] = initial.contact_force  # a contact under way does not begin again
+        self._work.force[:] = initial.contact_force  # a present contact does not begin again
 
     def touching(self) -> NDArray[np.bool_]:
-        """Which pairs pressed in the last step, (q,)."""
+        """Whether each pair was pressed in the last step, (q,)."""
         return self._work.force > 0.0
 
     @property
@@ -81,7 +81,7 @@ class ContactSteppingMarch(ModalMarch):
         return self._z
 
     def take_over(self, clock: Clock, recorder: Recorder, motion: Floats) -> None:
-        """Begin at the tick of `progress` with a motion (2 n,) of another march, whose record goes on.
+        """Begin at the tick of `progress` with a motion (2 n,) of another march, and continue its record.
 
         Up to the next whole step the motion is that of open contacts.
         """

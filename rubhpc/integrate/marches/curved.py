@@ -35,7 +35,7 @@ LOAD_TOLERANCE = 1.0  # of the loads of closed contacts, over the accuracy of th
 
 
 class CurvedMarch(EventDrivenMarch):
-    """A case from one contact mode to another, of which only flights have a closed form."""
+    """A case that passes through contact modes, of which only flights have a closed form."""
 
     has_closed_form = False
     has_piece_loop = False
@@ -48,14 +48,14 @@ class CurvedMarch(EventDrivenMarch):
         initial: State,
         check: Callable[[], None] | None,
     ) -> None:
-        """Start from `initial`, with the contacts closed that its forces press."""
+        """Start from `initial`; contacts with a force are closed."""
         self._force = initial.contact_force.copy()
         self._is_bent = any(stator.squared_slope is not None for stator in setup.model.stators)
         super().__init__(setup, clearance, friction, initial, check)
         self._take_pairs()
 
     def begin(self, setup: ModalSetup, place: Place) -> None:
-        """Begin again at another speed in the same reduced coordinates, from where a march has come."""
+        """Begin again at another speed in the same reduced coordinates, from the end of a march."""
         before, self._force = self._setup, place.contact_force.copy()
         super().begin(setup, place)
         if setup.reduced.stiffness is not before.reduced.stiffness or setup.model is not before.model:
@@ -64,13 +64,13 @@ class CurvedMarch(EventDrivenMarch):
             self._make_work()
 
     def start_again(self, state: State) -> bool:
-        """Start the same case again at another state, with what was found of its matrices and contacts."""
+        """Restart the same case at another state, with its known matrices and contact modes."""
         self._force = state.contact_force.copy()
         self._start_at(state)
         return True
 
     def _take_pairs(self) -> None:
-        """Find what curved gaps have of the matrices."""
+        """Compute the arrays for curved gaps."""
         setup = self._setup
         self._pairs = curved_pairs(
             setup.reduced, setup.model, self._coefficient, self._clearance, is_round=setup.is_updated
@@ -88,7 +88,7 @@ class CurvedMarch(EventDrivenMarch):
 
     def motion_of(self, progress: Progress, z: Floats) -> Floats:
         """Reduced displacements, then velocities (2 n,), of modal coordinates (2, m)."""
-        if progress.wanted >= 0:  # the mode is still to be entered with it
+        if progress.wanted >= 0:  # the mode has not been entered yet
             return self._motion
         motion = super().motion_of(progress, z)
         shift, n = self._curved.shift[progress.mode], self.bodies.stiffness.shape[0]
@@ -97,12 +97,12 @@ class CurvedMarch(EventDrivenMarch):
         return motion
 
     def find(self, mask: int) -> None:
-        """See that the tables hold a set of contacts.
+        """Ensure that the tables contain a set of contacts.
 
         Raises
         ------
         InputError
-            Too many sets for bent stators, of which short steps know nothing.
+            Too many sets for bent stators, which short steps do not support.
         """
         try:
             super().find(mask)
@@ -146,7 +146,7 @@ class CurvedMarch(EventDrivenMarch):
         )
 
     def _unsolved(self) -> str:
-        if self._is_bent:  # short steps know nothing of a bent stator
+        if self._is_bent:  # short steps do not support bent stators
             return NO_FORCES
         raise NoClosedForm
 

@@ -1,4 +1,4 @@
-"""What every integrator offers a case: advance it sample by sample, return its state and energy."""
+"""Interface of all integrators: advance a case sample by sample, return its state and energy."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ if TYPE_CHECKING:
 
 LONGEST_CALL = 0.15  # s; stop signals are handled between kernel calls
 ALL_SAMPLES = 2**62  # in one kernel call, which pauses by itself
-STEPS_A_SECOND = 5e5  # half of what every integrator does
-NO_FORCES = "no contact forces that obey the laws were found"  # why a case ends
+STEPS_A_SECOND = 5e5  # half of the rate of every integrator
+NO_FORCES = "no contact forces that obey the laws were found"  # reason of an end
 
 
 class March(ABC):
-    """A case under way; sample 0 is the first recorded one, the transient lies before it."""
+    """A running case; sample 0 is the first recorded one, the transient lies before it."""
 
     def __init__(self, check: Callable[[], None] | None, first_stride: int, model: Model) -> None:
-        """Take what is called between kernel calls, the samples of the first call, and what moves."""
+        """Set the function to call between kernel calls, the samples of the first call, and the model."""
         self.n_place = model.n_place
         self.n_body = model.n_place - len(model.turning_carriers)  # tips and carriers, their rotations aside
         self.n_step = 0
-        self.n_left = 0  # times that closed-form motion was left for short steps
+        self.n_left = 0  # times that closed form was left for short steps
         self.sample = 0
         self.check = check
         self._stride = max(1, first_stride)
@@ -37,7 +37,7 @@ class March(ABC):
     def advance(
         self, first: int, last: int, samples: Samples, accumulator: Accumulator, *, is_recorded: bool
     ) -> str | None:
-        """Go on from sample `first` to `last`; returns None, or why the case cannot go on."""
+        """Advance from sample `first` to `last`; returns None, or why the case cannot continue."""
         self.sample = first
         while self.sample < last:
             if self.check is not None:
@@ -48,7 +48,7 @@ class March(ABC):
             if reason is not None:
                 return reason
             self.sample = stop
-            # By steps, not by the clock: where a call ends decides the last bits of the modal results.
+            # By steps, not by the clock: the end of a call affects the last bits of modal results.
             elapsed = max(self.n_step - before, 1) / STEPS_A_SECOND
             stride = int(self._stride * min(2.0, 0.5 * LONGEST_CALL / elapsed))
             self._stride = min(max(1, stride), ALL_SAMPLES)  # a transient may be a thousand calls long
@@ -61,12 +61,12 @@ class March(ABC):
         """Advance from `self.sample` to sample `stop` in one kernel call."""
 
     def start_again(self, state: State) -> bool:
-        """Start the same case again at another state; False where that takes a new march."""
+        """Restart the same case at another state; False where that needs a new march."""
         return False
 
     @abstractmethod
     def touching(self) -> NDArray[np.bool_]:
-        """Which pairs are in contact, (q,)."""
+        """Whether each pair is in contact, (q,)."""
 
     @abstractmethod
     def energy(self) -> float:

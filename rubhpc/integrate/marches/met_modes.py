@@ -1,4 +1,4 @@
-"""The contact modes that one case has met, out of a library that all cases of a set-up share."""
+"""The contact modes that one case has met, from a library that all cases of a set-up share."""
 
 from __future__ import annotations
 
@@ -8,28 +8,28 @@ if TYPE_CHECKING:
     from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
     from rubhpc.kernels.contact_modes import ModeTables
 
-FORESEEN, MOST_FORESEEN = 8, 4  # pieces for which a set of contacts is found again at their beginning; sets
-MOST_REFILLS = 4  # of tables that one case may meet; where it meets more, short steps cost less
+FORESEEN, MOST_FORESEEN = 8, 4  # pieces at whose beginning a recent set of contacts is solved; most sets
+MOST_REFILLS = 4  # of the tables by one case; with more, short steps cost less
 
 
 class NoClosedForm(Exception):  # noqa: N818 - a state of the motion, never seen by users
-    """What only short steps can follow.
+    """The motion needs short steps.
 
-    Contacts open and close without end, or in too many combinations to tabulate.
+    Contacts open and close without end, or in too many combinations.
     """
 
 
 class MetModes:
     """Sets of closed contacts that a case has met, and the library that holds them.
 
-    What the kernel does must not depend on what other cases have left in the library: it is shown no set but
-    those that this case has met.
+    The kernel must not depend on what other cases have left in the library: it sees only sets that this case
+    has met.
     """
 
     def __init__(self) -> None:
         """Begin with no library."""
         self._n_piece = -1
-        self._asked: dict[int, int] = {}  # piece in which each set of contacts was last asked for
+        self._asked: dict[int, int] = {}  # piece in which each set of contacts was last requested
 
     def begin_piece(self, measured: ModeLibrary) -> None:
         """Begin at another speed, or for the first time, with the library of that speed."""
@@ -43,13 +43,13 @@ class MetModes:
                 self._add(foreseen)
 
     def library_for(self, *, is_recorded: bool) -> ModeLibrary:
-        """Contact modes with which a motion is recorded, or followed alone."""
+        """Contact modes to record a motion, or only to follow it."""
         return self._measured if is_recorded else self._measured.followed
 
     def ask_for(self, mask: int) -> None:
-        """Note that the case has come to a set of contacts that it had not met."""
+        """Register a set of contacts that the case had not met."""
         self._asked.pop(mask, None)
-        self._asked[mask] = self._n_piece  # the last one asked for comes last
+        self._asked[mask] = self._n_piece  # ordered by the last request
 
     def tables_with(self, mask: int) -> ModeTables:
         """Return the tables of the sets that this case has met, and of one more.
@@ -68,7 +68,7 @@ class MetModes:
         return tables
 
     def _add(self, mask: int) -> None:
-        """See that the library holds a set of contacts."""
+        """Ensure that the library contains a set of contacts."""
         self.met.add(mask)
         if len(self.met) > MOST_REFILLS * self._measured.followed.n_usual:
             raise NoClosedForm

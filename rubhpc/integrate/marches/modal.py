@@ -1,4 +1,4 @@
-"""What the two modal marches share: modal coordinates of a reduced model, advanced by kernels."""
+"""Common part of the modal marches: modal coordinates of a reduced model, advanced by kernels."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _BEGUN = bare(_NEW)
 
 
 class Place(NamedTuple):
-    """Where a case stands: what a march at another speed goes on from."""
+    """Present motion of a case, from which a march at another speed can continue."""
 
     motion: Floats  # (2 n,), reduced displacements about the sag, then velocities
     sag: Floats  # (n_rotor_dof,), m and rad
@@ -49,7 +49,7 @@ class Place(NamedTuple):
 
 
 class ModalMarch(March):
-    """A case in modal coordinates z (2, m), real and imaginary, of the contact mode that it is in."""
+    """A case in modal coordinates z (2, m), real and imaginary, of its present contact mode."""
 
     tables: ModeTables
 
@@ -65,9 +65,9 @@ class ModalMarch(March):
         super().__init__(check, ALL_SAMPLES, setup.model)
         offsets = np.array([stator.clearance_offset for stator in setup.model.stators])
         self._at_rest, self._coefficient = clearance + offsets, friction
-        self._model: Model | None = None  # to which the clearances belong
-        self._bodies_of: ModalSetup | None = None  # whose the bodies are
-        self._ended: Floats | None = None  # motion where the last call has ended
+        self._model: Model | None = None  # of the clearances
+        self._bodies_of: ModalSetup | None = None  # of the bodies
+        self._ended: Floats | None = None  # motion at the end of the last call
         records = _NEW.copy()
         self.progress: Progress = records[0]
         self._bare_records = bare(records)
@@ -78,11 +78,11 @@ class ModalMarch(March):
 
     @property
     def setup(self) -> ModalSetup:
-        """That of the speed at which the case goes on."""
+        """Set-up at the present speed."""
         return self._setup
 
     def reached(self) -> Place:
-        """Where the case stands, for another speed to go on from."""
+        """Present motion, for another speed to continue from."""
         motion = self._ended if self._ended is not None else self.motion()
         return Place(motion, self._setup.model.sag, self._contact_force())
 
@@ -94,10 +94,10 @@ class ModalMarch(March):
             self._bodies_of, self.bodies = setup, setup.bodies(self._coefficient, self._clearance)
         self._setup, self.clock = setup, setup.clock
         self._begin_time()
-        self._entered_with = self._clearance  # values of the coordinates that do not move
+        self._entered_with = self._clearance  # values of the constant coordinates
 
     def _begin_time(self) -> None:
-        """Stand at time 0, with nothing met yet."""
+        """Restart the time at 0."""
         self._ended = None
         self._bare_records[:] = _BEGUN
 
@@ -107,7 +107,7 @@ class ModalMarch(March):
 
     @abstractmethod
     def _unsolved(self) -> str:
-        """Why the case cannot go on where the kernel finds no forces, unless it goes on by another march."""
+        """Reason of an end where the kernel finds no forces, unless another march continues."""
 
     @abstractmethod
     def _contact_force(self) -> Floats:
@@ -124,7 +124,7 @@ class ModalMarch(March):
         return float(0.5 * (velocity @ velocity + displacement @ self.bodies.stiffness @ displacement))
 
     def final(self) -> State:
-        """State at the sample reached, as far as contact and outputs see it."""
+        """State at the sample reached, in the reduced coordinates."""
         return self.state_of(self.motion(), self._contact_force())
 
     def state_of(self, motion: Floats, contact_force: Floats) -> State:
@@ -164,7 +164,7 @@ class ModalMarch(March):
         self._enter_at(mode, self._entered_with, 1.0, 0.0, self._motion)
 
     def _enter_at(self, mode: int, clearance: Floats, cosine: float, sine: float, motion: Floats) -> None:
-        """Take the coordinates, in a contact mode of the tables, of a motion (2 n,) at the shaft's angle."""
+        """Set the coordinates, in a contact mode of the tables, of a motion (2 n,) at the shaft's angle."""
         tables = self.tables
         enter_with(
             int(tables.n_eigenmode[mode]),
@@ -201,13 +201,13 @@ class ModalMarch(March):
                 self.check()
 
     def _why_ended(self, outcome: int, accumulator: Accumulator) -> str | None:
-        """Why a case cannot go on after a kernel call, if it cannot."""
+        """Reason why a case cannot continue after a kernel call, if any."""
         if outcome == CONTACT_UNSOLVED:
             return self._unsolved()
         return self._why_diverged(outcome == DIVERGED, accumulator)
 
     def _why_diverged(self, is_at_event: bool, accumulator: Accumulator) -> str | None:
-        """What of the motion is beyond its limit; of the output node also what was so at a sample."""
+        """Reason of divergence of a motion, or of the output node at a sample."""
         setup = self._setup
         limit, motion = setup.displacement_limit, self._motion
         if not is_at_event:

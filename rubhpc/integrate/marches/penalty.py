@@ -1,4 +1,4 @@
-"""A case from event to event under a penalty: springs and dampers join bodies that press, in closed form."""
+"""A case from event to event under a penalty: springs and dampers between pressed bodies, in closed form."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ if TYPE_CHECKING:
 
 
 class PenaltyMarch(EventDrivenMarch):
-    """A case whose pairs are open, press, or are lifted: overlapped still, and without a force."""
+    """A case whose pairs are open, pressed, or lifted: still overlapped, without a force."""
 
     take_change = staticmethod(change_pressed)
 
     def change(
         self, mask: int, crossing: int, angle: float, motion: Floats, moment: float | None = None
     ) -> int:
-        """Take an event, which leaves `motion` (2 n,) as it is; returns the states that go on.
+        """Compute an event, which does not change `motion` (2 n,); returns the states afterwards.
 
-        Nothing impacts here: no `moment` decides whether a pair parts.
+        There are no impacts: `moment` has no effect.
         """
         return int(self.take_change(self.bodies, mask, crossing, motion))
 
     def moved_by(self, mask: int) -> int:
-        """What of a set of states decides how the bodies move: the pairs that press."""
+        """Part of a set of states that determines the motion: the pressed pairs."""
         return mask & ((1 << self._clearance.size) - 1)
 
     def opened(self, mask: int) -> NDArray[np.bool_]:
-        """Which pairs are open, and not lifted, (q,)."""
+        """Whether each pair is open and not lifted, (q,)."""
         return ~self.closed(mask) & ~self.closed(mask >> self._clearance.size)
 
     def _find_library(self, setup: ModalSetup, friction: float) -> ModeLibrary:

@@ -24,20 +24,20 @@ class PenaltyFrictionMarch(FrictionMarch):
     most_pairs = MOST_SOFT_PAIRS
 
     def opened(self, mask: int) -> NDArray[np.bool_]:
-        """Which pairs are open, and not lifted, (q,)."""
+        """Whether each pair is open and not lifted, (q,)."""
         q = self._clearance.size
         is_lifted = np.array([bool(mask >> lifted_place(q, i) & 1) for i in range(q)])
         return np.asarray(~self.closed(mask) & ~is_lifted)
 
     def _soften(self, solver: Workspace) -> None:
-        """A normal force is what it is, whatever others do to its gap."""
+        """Normal forces do not depend on each other."""
         solver.matrix[:], solver.coupling[:] = np.eye(len(solver.matrix)), 0.0
 
     def _first_mask(self, contact_force: Floats) -> int:
         return self._states_after(np.zeros(self._clearance.size, dtype=np.bool_), 0.0)
 
     def _states_after(self, is_pressed: NDArray[np.bool_], angle: float, further: int = 0) -> int:
-        """As the motion overlaps: what pressed in the short steps before is of no account."""
+        """States by the overlaps of the motion; forces of earlier short steps are not used."""
         q = self._clearance.size
         found = int(pressed_pairs(self.bodies, self._motion))
         pressed = np.array([bool(found >> i & 1) for i in range(q)])

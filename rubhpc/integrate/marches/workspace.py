@@ -11,7 +11,7 @@ from rubhpc.kernels.contact_pairs import N_DEGREE, Pairs, Workspace, fill_direct
 def workspace(pairs: Pairs, step: float, n_place: int = 0) -> Workspace:
     """Arrays for q pairs and a step (s), with directions and compliance along the stators' axes filled in.
 
-    The motion of `n_place` places may be looked at, more than there are pairs.
+    The motion of `n_place` places, more than pairs, may be read.
     """
     q = pairs.radius.size
     work = empty_workspace(q)

@@ -1,4 +1,4 @@
-"""Where a motion that settles will end, from its last few revolutions."""
+"""Extrapolation of a settling motion to its limit, from its last revolutions."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-LEAST_SHARE = 1e-6  # of the largest singular value: smaller ones are roundings, and what is not linear
+LEAST_SHARE = 1e-6  # of the largest singular value: smaller ones are rounding or nonlinear
 
 
 def extrapolated(motions: Floats, energy: Floats) -> Floats:
     """Return the fixed point of the linear map that takes each of k motions (k, 2 n) to the next, (2 n,).
 
-    Reduced rank extrapolation (Eddy 1979, Mesina 1977): of the combinations of the motions whose weights sum
-    to one, that whose change to the next one is least, and then that next one. It is exact where k - 2 modes
-    of the map or fewer are left in the motions. One motion is returned as it is.
+    Reduced rank extrapolation (Eddy 1979, Mesina 1977): the combination of motions, with weights that sum to
+    one, whose change under the map is least, mapped once. It is exact where the motions contain k - 2 modes
+    of the map or fewer. A single motion is returned unchanged.
 
     Parameters
     ----------

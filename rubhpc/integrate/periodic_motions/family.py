@@ -1,4 +1,4 @@
-"""Cases that differ in one parameter: motions carried from one to the next, derivatives by the parameter."""
+"""Cases that differ in one parameter: motions transferred between them, derivatives by the parameter."""
 
 from __future__ import annotations
 
@@ -38,15 +38,15 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 SPEEDS, CLEARANCES = ("speed_ratio", "speed"), ("clearance_ratio", "clearance")
-MOST_KEPT = 6  # cases that are kept ready
+MOST_KEPT = 6  # cases that are kept
 ROOM = 256_000_000  # bytes of the tables of further ones
-WITH_MODES = 2.2  # bytes of tables, modes as they were solved and as pieces take them, over those of tables
+WITH_MODES = 2.2  # bytes of tables and modes, as solved and for pieces, over those of tables
 DIFFERENCE = 1e-6  # of the range, between the two cases of a derivative
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Operation:
-    """How a rig runs: one of two speeds and one of two clearances are None."""
+    """Operation of a rig: one of the two speeds and one of the two clearances is None."""
 
     rig: Rig
     speed_ratio: float | None = None
@@ -82,7 +82,7 @@ class Family:
     along : str
         speed_ratio, speed, clearance_ratio, clearance, friction or a key of the rig.
     ends : (2,)
-        Of the range of the parameter; the smallest change of interest is small beside it.
+        Of the range of the parameter; the smallest change of interest is small compared with it.
 
     Attributes
     ----------
@@ -91,11 +91,11 @@ class Family:
     """
 
     def __init__(self, operation: Operation, along: str, ends: tuple[float, float]) -> None:
-        """Take the case that is varied."""
+        """Set the case that is varied."""
         self.along, self.span = along, abs(ends[1] - ends[0])
         self._operation, self._ends = operation, ends
         self._speeds: AlongSpeeds | None = None
-        self._kept: list[NDArray[np.bool_]] = []  # modes that either end of the range keeps
+        self._kept: list[NDArray[np.bool_]] = []  # modes kept at either end of the range
         self._models: OrderedDict[int, tuple[Rig, Model]] = OrderedDict()
         self._frequency: tuple[Model, float] | None = None
         self._setups: OrderedDict[tuple[int, float, bool], ModalSetup] = OrderedDict()
@@ -110,7 +110,7 @@ class Family:
         Unfollowed
             It has no closed form.
         InputError
-            There is no such case.
+            The case does not exist.
         """
         if value not in self._cases:
             setup, clearance, friction = self.settings(value, is_measured=self.along not in SPEEDS)
@@ -125,15 +125,15 @@ class Family:
         return self._cases[value]
 
     def hold(self, case: PiecewiseMotion) -> None:
-        """Keep a case ready as long as there is room, the last ones first."""
+        """Keep a case while there is room, the latest ones first."""
         self._held[id(case)] = case
         self._held.move_to_end(id(case))
-        room = ROOM - sum(map(_size, self._held.values()))  # they grow while they are followed
+        room = ROOM - sum(map(_size, self._held.values()))  # they grow while they are used
         while room < 0 and len(self._held) > 1:
             room += _size(self._held.popitem(last=False)[1])
 
     def settings(self, value: float, *, is_measured: bool = True) -> tuple[ModalSetup, float, float]:
-        """Set-up, clearance (m) and friction at a value; to be recorded, or to be followed alone."""
+        """Set-up, clearance (m) and friction at a value; to record, or only to follow."""
         case = self._operation.at(self.along, value)
         model = self._model(case.rig)
         spin = self._spin(case, model)
@@ -168,9 +168,9 @@ class Family:
     def derivative(
         self, value: float, motion: Floats, states: int, revolutions: list[Revolution], phase: float
     ) -> Floats:
-        """Derivative (2 n,) by the parameter of how far a motion is from closing, its beginning held.
+        """Derivative (2 n,) by the parameter of the residual of a period, at a fixed beginning.
 
-        By the clearance it is exact; by another parameter the difference of two flow maps.
+        It is exact for the clearance; for other parameters it is the difference of two flow maps.
         """
         here = self.at(value)
         if self.along in CLEARANCES:
@@ -183,7 +183,7 @@ class Family:
         return (defect - (revolutions[-1].end - motion)) / step
 
     def _forget(self, case: PiecewiseMotion) -> None:
-        """Free what a set-up that is shared holds of one friction."""
+        """Free the contact modes of one friction in a shared set-up."""
         if self.along == "friction":
             case.setup.forget(float(case.bodies.friction[0]))
 
@@ -214,9 +214,9 @@ class Family:
         return self._models[id(rig)][1]
 
     def _reduced(self, model: Model, spin: float) -> ReducedModel | None:
-        """A model with the modes of the whole range; None where it has one model, at one speed.
+        """A model with the modes of the whole range; None for a single model at one speed.
 
-        Where its speed alone changes it is in the same coordinates everywhere.
+        Where only its speed changes, it has the same coordinates everywhere.
         """
         integrator = self._operation.integrator
         if self.along in (*CLEARANCES, "friction") or integrator.method != "modal":
@@ -226,7 +226,7 @@ class Family:
             model = model_at(model, spin)
             parts = at_standstill(model).parts
             if [part.frequency.size for part in parts] != [of.size for of in self._kept]:
-                return None  # it is coupled otherwise
+                return None  # its coupling differs
             are_kept = [completed(part, of) for part, of in zip(parts, self._kept, strict=True)]
             return reduce_to(model, spin, integrator.accuracy, are_kept)
         if self._speeds is None:
@@ -276,7 +276,7 @@ class Family:
 
 
 def _size(case: PiecewiseMotion) -> float:
-    """Bytes of its tables and of the modes behind them."""
+    """Bytes of its tables and modes."""
     return WITH_MODES * sum(table.nbytes for table in case.march.tables if isinstance(table, np.ndarray))
 
 

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-ALIGNING, FOLLOWED = 16, 256  # revolutions: until the displacements have turned, and then measured
-LOST = 1e-280  # of a displacement: below that it is gone
+ALIGNING, FOLLOWED = 16, 256  # revolutions: to align the displacements, then to measure
+LOST = 1e-280  # a smaller displacement counts as zero
 
 
 def spectrum_of(begin: Callable[[], PiecewiseMotion], n_exponent: int) -> dict[str, float]:
@@ -29,7 +29,7 @@ def spectrum_of(begin: Callable[[], PiecewiseMotion], n_exponent: int) -> dict[s
     Parameters
     ----------
     begin : callable
-        Makes its piecewise motion. Where that cannot be followed all are NaN.
+        Makes its piecewise motion. Where that cannot be followed, all values are NaN.
     n_exponent : int
         Exponents; those beyond the number of states are NaN.
     """
@@ -51,9 +51,9 @@ def exponents(
 ) -> Floats:
     """The largest Lyapunov exponents per revolution, (n_exponent,), largest first.
 
-    Displacements are carried by the exact tangent map, exponentials and saltation matrices, and made
-    orthogonal after every revolution (Benettin, Galgani, Giorgilli and Strelcyn 1980). -inf where an impact
-    or a closed gap takes a direction away.
+    Displacements are propagated by the exact tangent map, exponentials and saltation matrices, and
+    orthogonalised after every revolution (Benettin, Galgani, Giorgilli and Strelcyn 1980). -inf where an
+    impact or a closed gap removes a direction.
 
     Raises
     ------
@@ -61,7 +61,7 @@ def exponents(
         The motion cannot be followed from event to event.
     """
     weight = np.repeat([abs(piecewise.setup.spin), 1.0], piecewise.n)[:, None]  # energies are their squares
-    # Columns that are neither displacements nor velocities alone, the same for every case.
+    # Columns that mix displacements and velocities, the same for every case.
     angle = np.pi * (np.arange(2 * piecewise.n) + 0.5) / (2 * piecewise.n)
     columns = np.linalg.qr(np.cos(np.outer(angle, np.arange(n_exponent))))[0]
     motion, states = piecewise.start, piecewise.states

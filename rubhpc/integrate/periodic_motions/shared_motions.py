@@ -28,10 +28,10 @@ if TYPE_CHECKING:
     from rubhpc.integrate.record import State
     from rubhpc.study.study import Recording
 
-SPEEDS, DIRECTIONS = (1.0, 3.0), 4  # of the output node, over spin times clearance; on the way to a motion
-MOST_POINTS = 16  # operating points of one set-up whose motions are kept
-LONGEST = 128  # revolutions in which a fixed start is to reach its motion
-MOST_VAIN = 3  # starts in a row that reach none: where motions are not periodic, all fail
+SPEEDS, DIRECTIONS = (1.0, 3.0), 4  # of the output node, over spin times clearance; and their directions
+MOST_POINTS = 16  # operating points of a set-up whose motions are kept
+LONGEST = 128  # revolutions in which a fixed start must reach its motion
+MOST_VAIN = 3  # consecutive starts without a motion: where motions are not periodic, all fail
 
 _Kept = OrderedDict[tuple[float, float, "Recording"], KnownMotions]
 _KEPT: WeakKeyDictionary[ModalSetup, _Kept] = WeakKeyDictionary()
@@ -48,8 +48,8 @@ def shared_motions(
     """Return the stable periodic motions that a fixed set of starts reaches, and whether they are new.
 
     These are the contact-free motion and rest, and the first of them with the output node moving up, left,
-    down and right at one and at three times the spin times the clearance; none after three in a row that
-    reach nothing.
+    down and right at one and at three times the spin times the clearance; the search ends after three
+    consecutive starts without a motion.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def _add(
 
 
 def _starts(setup: ModalSetup, clearance: float) -> Iterator[State]:
-    """The fixed starts: those that the rig knows."""
+    """The fixed starts that the rig allows."""
     least = clearance + min(stator.clearance_offset for stator in setup.model.stators)
     unit = abs(setup.spin) * max(least, 0.0)
     based: list[str] = []
@@ -117,4 +117,4 @@ def _starts(setup: ModalSetup, clearance: float) -> Iterator[State]:
             try:
                 yield start_of(moved, setup, clearance)
             except InputError:
-                continue  # the output node is held in that direction
+                continue  # the output node is constrained in that direction

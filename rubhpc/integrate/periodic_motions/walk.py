@@ -1,4 +1,4 @@
-"""A case under way to a periodic motion: its last revolutions, and the known motions that it may reach."""
+"""A case on its way to a periodic motion: its last revolutions, and known motions that it may reach."""
 
 from __future__ import annotations
 
@@ -25,44 +25,44 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 AT_ONCE = 1024  # revolutions in one call
-LEADING = 16  # periods before a search whose motions say where it begins
+LEADING = 16  # periods before a search that determine its start
 KEPT = LEADING * LONGEST_PERIOD  # revolutions whose ends are kept
-LOOK, N_LOOK = 4, 2  # revolutions after which a case is compared with known motions; looks at the nearest
+LOOK, N_LOOK = 4, 2  # revolutions between comparisons with known motions; comparisons with the nearest
 
 
 class Passed(NamedTuple):
-    """A transient that has been passed, or has ended the case."""
+    """A finished transient, or the end of the case in it."""
 
-    march: EventDrivenMarch  # from which the case goes on
-    reason: str | None  # why it cannot
+    march: EventDrivenMarch  # from which the case continues
+    reason: str | None  # why it cannot continue
     n_revolution: int  # simulated
-    n_step: int  # taken by other marches than that one
-    reached: int | None = None  # number of the place of a known motion, at which the case has arrived
-    found: tuple[PiecewiseMotion, Orbit] | None = None  # the motion that was solved for, where none was known
+    n_step: int  # steps of other marches
+    reached: int | None = None  # number of the place of a known motion that the case has reached
+    found: tuple[PiecewiseMotion, Orbit] | None = None  # the motion solved for, where none was known
 
 
 class Walk:
-    """A case under way.
+    """A running case.
 
     Attributes
     ----------
     march : EventDrivenMarch
     n_revolution, n_step : int
-        Revolutions simulated, and steps taken before the march was last begun again.
+        Revolutions simulated, and steps before the last restart of the march.
     passed : (k, 2 n)
         Motions at the ends of the last revolutions, the present one last.
     states : int
-        Those of the pairs now.
+        Present states of the pairs.
     """
 
     def __init__(self, march: EventDrivenMarch, recording: Recording) -> None:
-        """Stand where a march begins."""
+        """Start at the beginning of a march."""
         self.march, self._recording = march, recording
         self._idle = idle_of(march)
         self.n_revolution = self.n_step = 0
         self.states = march.mask
         self.passed = march.motion()[np.newaxis]
-        self._place: tuple[ModalSetup, Place] | None = None  # where to begin before going on
+        self._place: tuple[ModalSetup, Place] | None = None  # where to begin before continuing
 
     @property
     def n_left(self) -> int:
@@ -70,7 +70,7 @@ class Walk:
         return self._recording.longest_transient - self.n_revolution
 
     def on(self, n_revolution: int) -> str | None:
-        """Go on, at most to the longest transient; returns why the case cannot."""
+        """Continue, at most to the longest transient; returns why the case cannot."""
         left = min(n_revolution, self.n_left)
         while left > 0:
             now = min(left, AT_ONCE)
@@ -83,18 +83,18 @@ class Walk:
         return None
 
     def repeat(self, period: int) -> tuple[Floats | None, str | None]:
-        """Go on by a period: the motion then, None where the transient ends before, and why it cannot."""
+        """Continue by a period: the motion then, or None where the transient ends before; why it cannot."""
         if period > self.n_left:
             return None, None
         reason = self.on(period)
         return (self.passed[-1] if reason is None else None), reason
 
     def begin_at(self, setup: ModalSetup, place: Place) -> None:
-        """Go on with another motion, or with the same and tables that may have been filled again."""
+        """Continue with another motion, or with the same one and tables that may have been refilled."""
         self._place = setup, place
 
     def stand(self) -> None:
-        """Go on from here, whatever else the march is used for meanwhile."""
+        """Continue from here later, whatever the march is used for in between."""
         if self._place is None:
             self.begin_at(self.march.setup, self.march.reached())
 
@@ -105,10 +105,10 @@ class Walk:
             self._place = None
 
     def arrive(self, known: KnownMotions, wanted: int) -> tuple[int | None, str | None]:
-        """Go on to a known motion, or to a number of revolutions: its place, and why the case cannot go on.
+        """Continue to a known motion, or to a number of revolutions: its place; why the case cannot continue.
 
-        Every four revolutions the case is compared with the nearest motion; it has arrived where it does as
-        the linear theory about that says (`Approach.obeys`) until it has halved its distance, and over four
+        Every four revolutions the case is compared with the nearest motion. It has arrived where it follows
+        the linear theory about that motion (`Approach.obeys`) until the distance has halved, over four
         revolutions or more.
         """
         while min(wanted - self.n_revolution, self.n_left) >= LOOK:
@@ -138,7 +138,7 @@ class Walk:
                 return None, None
             if n_look >= N_LOOK and place.approach.square(apart) <= HALF * first:
                 return number, None
-        raise AssertionError  # the looks never end
+        raise AssertionError  # the loop does not end otherwise
 
     def ended(
         self,
@@ -146,6 +146,6 @@ class Walk:
         reached: int | None = None,
         found: tuple[PiecewiseMotion, Orbit] | None = None,
     ) -> Passed:
-        """What has been passed, with the march where the case goes on."""
+        """The finished transient, with the march to continue from."""
         self._begin()
         return Passed(self.march, reason, self.n_revolution, self.n_step, reached, found)
