@@ -47,7 +47,7 @@ SLOW = (
     "input/test_reading.py::test_pint_stays_away_until_it_is_needed",
     "integrate/branches/test_branch.py",
     "integrate/branches/test_touch_that_vanishes.py",
-    "running/test_branch_runs.py::test_plan_foresees_branches_from_how_far_the_first_has_come",
+    "running/test_branch_runs.py::test_plan_predicts_branches_from_how_far_the_first_has_come",
     "integrate/marches/test_contact_stepping_march.py",
     "integrate/marches/test_curved_march.py",
     "integrate/changing_speed/test_carried_modes.py",

@@ -117,7 +117,7 @@ class Pilots:
         whole = sum(seconds for _, seconds in self._followed)
         return (followed + self._usual * self._longest) / (whole + self._longest) if whole else self._usual
 
-    def foreseen(self, index: tuple[int, ...]) -> float:
+    def predicted(self, index: tuple[int, ...]) -> float:
         """Predicted time of a shortened case, s, from all cases so far."""
         return self.shortened[index].whole(self.n_behind)
 
@@ -183,23 +183,23 @@ class Pilots:
 
     def _left(self, case: Case, followed: FollowedCase) -> float:
         """Use a case that was not run whole; returns its predicted time, s."""
-        self._foresee(case.index, followed)
+        self._predict(case.index, followed)
         self._first[case.index] = self.shortened[case.index], followed.seconds
         self._kept[case.index] = followed
         self._kept = self._affordable()
-        return self.foreseen(case.index)
+        return self.predicted(case.index)
 
-    def _foresee(self, index: tuple[int, ...], followed: FollowedCase) -> None:
+    def _predict(self, index: tuple[int, ...], followed: FollowedCase) -> None:
         self.shortened[index], self._spent[index] = followed.forecast(), followed.seconds
         (self.irregular.add if followed.is_irregular else self.irregular.discard)(index)
-        self._longest = max(self._longest, self.foreseen(index))
+        self._longest = max(self._longest, self.predicted(index))
 
     def _affordable(self) -> dict[tuple[int, ...], FollowedCase]:
         """The longest of the cases that may be finished, and others while contact modes leave memory."""
         kept: dict[tuple[int, ...], FollowedCase] = {}
         held: set[int] = set()
         n_byte, most = 0, min(_MOST_KEPT, max(MOST_BYTES, _OF_FREE * free_memory()))
-        for index in sorted(self._kept, key=self.foreseen, reverse=True):
+        for index in sorted(self._kept, key=self.predicted, reverse=True):
             setup = self._kept[index].setup
             more = 0 if id(setup) in held else bytes_of_modes(setup)
             if not kept or n_byte + more <= most:
@@ -253,7 +253,7 @@ class Pilots:
 
     def left(self, index: tuple[int, ...]) -> float:
         """Predicted time to finish a shortened case, s; 0 where it is no longer kept."""
-        return self.foreseen(index) - self._kept[index].seconds if index in self._kept else 0.0
+        return self.predicted(index) - self._kept[index].seconds if index in self._kept else 0.0
 
     def seconds_of_next(self, index: tuple[int, ...]) -> float:
         """Approximate time of the next part of a shortened case, s."""
@@ -267,7 +267,7 @@ class Pilots:
         if followed.is_whole:
             self._take_in(followed)
             self.ended.add(index)
-        self._foresee(index, followed)
+        self._predict(index, followed)
         if followed.is_whole or not is_done:
             del self._kept[index]
         return is_done

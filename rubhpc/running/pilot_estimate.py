@@ -78,9 +78,9 @@ class Sample:
         """Factor for the predicted rest of a case: a ratio, shrunk towards 1."""
         if not self.checked:
             return 1.0
-        foreseen, taken = np.sum(self.checked, axis=0)
-        usual = foreseen / len(self.checked)
-        return float((taken + usual) / (foreseen + usual))
+        predicted, taken = np.sum(self.checked, axis=0)
+        usual = predicted / len(self.checked)
+        return float((taken + usual) / (predicted + usual))
 
     def estimate(self) -> tuple[float, float, float]:
         """Seconds per case, seconds per step, and the standard error of the sum over all cases, s.
@@ -98,9 +98,9 @@ class Sample:
         base, slope = _line(steps, seconds, weight)
         n_unseen = max(self.n_case - n, 0)
         unseen = base * n_unseen + slope * max(self.all_steps - steps.sum(), 0.0)
-        foreseen = base * self.n_case + slope * self.all_steps
+        predicted = base * self.n_case + slope * self.all_steps
         whole = float(seconds.sum() + unseen) if n_unseen else float(seconds.sum())
-        scale = whole / foreseen if foreseen > 0.0 else 1.0
+        scale = whole / predicted if predicted > 0.0 else 1.0
         n_free = n - (1 + (base > 0.0 and slope > 0.0))
         share = n_unseen / max(self.n_case, 1)
         if n_unseen == 0:

@@ -112,12 +112,12 @@ def time_pilots(
     def spent() -> float:
         return time.process_time() - began - pilots.loading - pilots.compiling
 
-    def foreseen() -> float:
+    def predicted() -> float:
         return n_case * float(np.mean(sample.seconds)) if paces else 0.0
 
     def allowed() -> float:
         """Seconds that are left."""
-        return min(max(_LEAST, _SHARE * foreseen()), _MOST + _LONGEST) - spent()
+        return min(max(_LEAST, _SHARE * predicted()), _MOST + _LONGEST) - spent()
 
     for k, (index, steps, probability) in enumerate(_picked(blocks, missing)):
         if k >= few and spent() > (_ENOUGH if _spread(sample) <= _AGREED else _MOST):
@@ -153,7 +153,7 @@ def time_pilots(
     if pilots.shortened:
         say(f"timing cases: {len(paces)} so far, now the longest to their end")
     # The beginnings alone may have taken all that is allowed.
-    _finish(pilots, picked, sample, max(allowed(), min(_LEAST, _HALF * foreseen())))
+    _finish(pilots, picked, sample, max(allowed(), min(_LEAST, _HALF * predicted())))
     block = time_block(manifest, pilots.arrays) if pilots.arrays else 0.0
     seconds = time.process_time() - began - pilots.loading
     if not paces:
@@ -191,11 +191,11 @@ def _finish(pilots: Pilots, picked: list[tuple[int, ...]], sample: Sample, secon
             break
         index = max(going, key=pilots.left)
         is_done = pilots.go_on(index, left)
-        sample.seconds[shortened[index]] = pilots.foreseen(index)
+        sample.seconds[shortened[index]] = pilots.predicted(index)
         if not is_done:
             break
     for index, k in shortened.items():
-        sample.seconds[k], sample.spent[k] = pilots.foreseen(index), pilots.spent(index)
+        sample.seconds[k], sample.spent[k] = pilots.predicted(index), pilots.spent(index)
         if index in pilots.ended:
             sample.is_whole[k] = True
             spent, to_come = pilots.first(index)

@@ -1,4 +1,4 @@
-"""What `rubhpc plan` foresees against what a run takes, in processor time."""
+"""What `rubhpc plan` predicts against what a run takes, in processor time."""
 
 import re
 import resource
@@ -67,13 +67,13 @@ def small_study(folder, name):
 
 
 @pytest.mark.parametrize("name", [*STUDIES, *CONTACTS])
-def test_plan_foresees_the_processor_time_of_a_run(name, tmp_path, capsys):
+def test_plan_predicts_the_processor_time_of_a_run(name, tmp_path, capsys):
     path = small_study(tmp_path, name) if name in CONTACTS else ROOT / "jobs" / f"{name}.toml"
     store = tmp_path / "store.zarr"
     _, out = processor_time("plan", path, "--output", store)
     found = re.search(r"steps, (\S+) core-hours", out)
-    foreseen = 3600.0 * float(found[1])
+    predicted = 3600.0 * float(found[1])
     taken, _ = processor_time(path, "--output", store, "--quiet")
     with capsys.disabled():
-        print(f"\n{name:12} foreseen {foreseen:6.1f} s, taken {taken:6.1f} s, ratio {foreseen / taken:.2f}")
-    assert taken / WORST < foreseen < WORST * taken
+        print(f"\n{name:12} plan {predicted:6.1f} s, taken {taken:6.1f} s, ratio {predicted / taken:.2f}")
+    assert taken / WORST < predicted < WORST * taken

@@ -164,7 +164,7 @@ def test_plan_run_status_verify(capsys, tmp_path):
     assert (code, out, err) == (0, "12 cases checked, no damage\n", "")
 
 
-def test_plan_foresees_what_the_store_holds(capsys, tmp_path):
+def test_plan_predicts_what_the_store_holds(capsys, tmp_path):
     """Bytes are before compression, so the finished store is no larger; files are counted to a tenth."""
     study, store = write_study(tmp_path), tmp_path / "tiny.zarr"
     _, out, _ = call(capsys, "plan", study)

@@ -170,7 +170,7 @@ def test_the_size_is_kept_and_what_is_left_out_is_said(
     assert all(note in html.unescape(text) for note in load.notes)
 
 
-def test_foreseeing_the_size_reads_no_case_but_the_pilots(
+def test_predicting_the_size_reads_no_case_but_the_pilots(
     two_stator_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What lies around the pilots of 100 000 cases took longer to read than all that is on the page."""

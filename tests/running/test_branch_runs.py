@@ -226,9 +226,9 @@ def test_case_without_a_motion_is_done_with_a_remark(tmp_path, monkeypatch):
     assert rubhpc.open(tmp_path / "none.zarr").sizes["point"] == 0
 
 
-def test_plan_foresees_branches_from_how_far_the_first_has_come(tmp_path, monkeypatch):
+def test_plan_predicts_branches_from_how_far_the_first_has_come(tmp_path, monkeypatch):
     """Cut off where a motion is sought for the n-th time; later it has come by more of the range."""
-    foreseen = []
+    predicted = []
     for most in (8, 12):
         began: list[int] = []
 
@@ -248,5 +248,5 @@ def test_plan_foresees_branches_from_how_far_the_first_has_come(tmp_path, monkey
         assert len(began) == most  # the other case would take as long
         assert "at least" not in plan.text()
         assert re.search(r"\(\d.* to \d.* on one core\)", plan.text())
-        foreseen.append(3600.0 * plan.core_hours)
-    assert 2.0 < foreseen[1] < foreseen[0] < 60.0  # two cases, each 1 s for a share of its range
+        predicted.append(3600.0 * plan.core_hours)
+    assert 2.0 < predicted[1] < predicted[0] < 60.0  # two cases, each 1 s for a share of its range

@@ -431,15 +431,15 @@ SWEEP = '{ start = 0.9, stop = 2.0, num = 12, sweep = "up" }'
     ],
     ids=["grid", "sample", "sweep", "many speeds"],
 )
-def test_as_many_speeds_are_prepared_as_are_foreseen(physics, tmp_path, write):
+def test_as_many_speeds_are_prepared_as_are_predicted(physics, tmp_path, write):
     read = read_study(write(tmp_path))
     grid = CaseGrid(read)
-    foreseen = count_preparations(grid, np.ones(grid.shape, bool))
+    predicted = count_preparations(grid, np.ones(grid.shape, bool))
     run(read, quiet=True)
-    assert foreseen.speed == len(physics.prepared)
+    assert predicted.speed == len(physics.prepared)
 
 
-def test_preparations_of_many_cases_are_foreseen_from_a_part(tmp_path, monkeypatch):
+def test_preparations_of_many_cases_are_predicted_from_a_part(tmp_path, monkeypatch):
     grid = CaseGrid(read_study(write_sample(tmp_path, n=64)))
     whole = count_preparations(grid, np.ones(grid.shape, bool))
     monkeypatch.setattr("rubhpc.running.preparations._MOST_COUNTED", 200)

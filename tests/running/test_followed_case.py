@@ -1,4 +1,4 @@
-"""What `rubhpc plan` foresees of a case that is run part by part."""
+"""What `rubhpc plan` predicts of a case that is run part by part."""
 
 import math
 from dataclasses import replace

@@ -26,7 +26,7 @@ def test_all_cases_timed_leave_no_error():
 
 
 @pytest.mark.parametrize(("base", "slope"), [(2.0, 0.0), (0.0, 3.0), (2.0, 3.0)])
-def test_times_on_a_line_are_foreseen_from_three(base, slope):
+def test_times_on_a_line_are_predicted_from_three(base, slope):
     """The same time a case, the same a step, and both."""
     steps = np.linspace(1.0, 4.0, 40)
     seconds = base + slope * steps
@@ -54,7 +54,7 @@ def test_range_holds_the_time_of_most_plans():
     assert np.mean(middle) == pytest.approx(1.0, abs=0.05)
 
 
-def test_times_foreseen_from_parts_are_corrected_by_whole_cases():
+def test_times_predicted_from_parts_are_corrected_by_whole_cases():
     sample = Sample(4, 4.0)
     sample.add(1.0, 0.25, 2.0, is_whole=True)
     sample.add(1.0, 0.25, 1.0, is_whole=False)

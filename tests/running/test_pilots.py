@@ -91,14 +91,14 @@ class Shortened:
     def spent(self, index):
         return sum(self.parts[index][: self._at[index] + 1])
 
-    def foreseen(self, index):
+    def predicted(self, index):
         return self.forecasts[index][self._at[index]]
 
     def first(self, index):
         return self.parts[index][0], self.forecasts[index][0] - self.parts[index][0]
 
     def left(self, index):
-        return self.foreseen(index) - self.spent(index)
+        return self.predicted(index) - self.spent(index)
 
     def seconds_of_next(self, index):
         return self.parts[index][self._at[index] + 1]
@@ -120,7 +120,7 @@ def gone_on(monkeypatch, parts, forecasts, seconds):
     monkeypatch.setattr(pilots, "time", SimpleNamespace(process_time=lambda: now[0]))
     sample = Sample(len(parts), 1e3 * len(parts))
     for index in parts:
-        sample.add(1e3, 1 / len(parts), found.foreseen(index), is_whole=False, spent=found.spent(index))
+        sample.add(1e3, 1 / len(parts), found.predicted(index), is_whole=False, spent=found.spent(index))
     pilots._finish(found, list(parts), sample, seconds)
     return found, sample
 
@@ -265,7 +265,7 @@ def test_shortened_cases_of_a_ring_are_kept_while_memory_lasts(monkeypatch):
     def kept(cases):
         setups = {name: SimpleNamespace(name=name) for name in sizes}
         found._kept = {(k,): SimpleNamespace(setup=setups[name]) for k, (name, _) in enumerate(cases)}
-        monkeypatch.setattr(found, "foreseen", lambda index: cases[index[0]][1])
+        monkeypatch.setattr(found, "predicted", lambda index: cases[index[0]][1])
         return [found._kept[index].setup.name for index in found._affordable()]
 
     monkeypatch.setattr(pilot_cases, "free_memory", lambda: 0.0)

@@ -62,7 +62,7 @@ def test_a_case_that_takes_long_says_where_it_is(clock, capsys):
     ]
 
 
-def test_a_refined_map_of_more_cases_than_foreseen_does_not_say_that_it_ends(clock, capsys):
+def test_a_refined_map_of_more_cases_than_predicted_does_not_say_that_it_ends(clock, capsys):
     with Progress(20, 100, n_done=0, quiet=False, has_bar=False) as shown:
         shown.expect(10)
         for done in (9, 12):

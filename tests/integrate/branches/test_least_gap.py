@@ -50,7 +50,7 @@ def test_gradient_is_that_of_differences(point):
         assert found.gradient @ change == pytest.approx(0.5 * rise, rel=1e-6)
 
 
-def test_weak_impact_is_foreseen_to_its_leading_order(point):
+def test_weak_impact_is_predicted_to_its_leading_order(point):
     """A motion that passes the wall by a little, beside one that misses it by as much.
 
     What the damping of high modes adds while the pair touches goes with the depth, the impact with its root.

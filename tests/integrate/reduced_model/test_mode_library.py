@@ -372,7 +372,7 @@ def test_more_room_keeps_no_motion_in_closed_form_for_longer(monkeypatch):
     assert both.n_usual == both.n_most
 
 
-def test_memory_with_more_samples_ahead_is_foreseen(case):
+def test_memory_with_more_samples_ahead_is_predicted(case):
     """From tables of one sample, as those of a large ring, to those that the library holds."""
     library, held = case.library, case.library._tables_of(case.library._opened, case.reduced)
     more = library._n_ahead, library._n_level
