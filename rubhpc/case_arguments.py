@@ -42,7 +42,7 @@ AT_REST = Initial()
 
 
 class CaseArguments(ContactArguments, total=False):
-    """What `simulate` takes to describe a case, but for its rig.
+    """Arguments of `simulate` that describe a case, without its rig.
 
     Keys of the tables [contact] and [integrator] are read and checked as those tables declare them.
     """

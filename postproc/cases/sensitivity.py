@@ -93,7 +93,7 @@ def _gridded(store: xr.Dataset, measure: str, n_draw: int, confidence: float, se
     half = half_widths(filled, ~usable, residuals, n_draw, confidence, seed)
     shares = grid_indices(filled)
     found = _described(store, values, filled, [str(d) for d in values.dims], shares, half, confidence)
-    for name in ("first_order", "total"):  # shares, but for rounding
+    for name in ("first_order", "total"):  # shares up to rounding
         for end in ("", "_low", "_high"):
             found[name + end] = found[name + end].clip(0.0, 1.0, keep_attrs=True)
     found["levels"] = ("axis", np.array(values.shape), {"units": "1", "long_name": "levels of the axis"})

@@ -1,4 +1,4 @@
-"""The motions that starts reach, beside their basins: orbits, or section points along an axis."""
+"""The motions that starts reach, drawn next to their basins: orbits, or section points along an axis."""
 
 from __future__ import annotations
 

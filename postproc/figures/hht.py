@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 _DECIBELS = 40.0  # of energy below its peak that are shown
 _BLUR = 0.006  # of the ordinate: the half width of a line
-_LABEL_WIDTH = 20  # characters that fit beside a panel
+_LABEL_WIDTH = 20  # characters that fit next to a panel
 _SHADE = "0.9"
 
 

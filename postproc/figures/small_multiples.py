@@ -20,15 +20,15 @@ if TYPE_CHECKING:
     from postproc.figures.palette import Paint
 
 _TITLE_WIDTH = 90  # characters of the titles of a row of panels
-_BAR_WIDTH = 40  # characters beside a scale of colours
+_BAR_WIDTH = 40  # characters next to a colour scale
 _DISTINCT = 5  # names of a scale that are always written: periods up to 4 have colours of their own
-_MOST_NAMES = 16  # that fit beside a scale
+_MOST_NAMES = 16  # that fit next to a scale
 _COLUMN = 3.46  # inches, width of a figure of one column
 _LEGEND_WIDTH = 64  # characters that fit a column of a page, 6 of them taken by each handle
 
 
 def color_bar(axes: Sequence[Axes], mesh: Any, paint: Paint) -> Colorbar:
-    """Draw the scale of colours beside all panels."""
+    """Draw the colour scale next to all panels."""
     bar = axes[0].figure.colorbar(mesh, ax=list(axes), pad=0.02, aspect=25, ticks=paint.ticks)
     name, comma, rest = paint.label.rpartition(", ")
     bar.set_label(f"{name},\n{rest}" if comma and len(paint.label) > _BAR_WIDTH else paint.label)
@@ -74,7 +74,7 @@ def legend_below(ax: Axes, handles: list[Artist]) -> None:
 
 
 def color_names(names: Sequence[str]) -> list[str]:
-    """Return the names beside a scale of colours: of many, the first five, and some of the others."""
+    """Return the names next to a colour scale: of many, the first five and some of the others."""
     step = -(-len(names) // _MOST_NAMES)
     last = len(names) - 1
     return [

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from postproc.figures.options import Axis, Bounds, Positive
 
-_LABEL_WIDTH = 38  # characters that fit beside a panel
+_LABEL_WIDTH = 38  # characters that fit next to a panel
 _FLOOR = 1e-5  # of the highest line, on a log scale
 _NAMES = {"frequency": "Frequency (Hz)", "order": "Order (multiples of spin speed)"}
 

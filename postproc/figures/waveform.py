@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from postproc.figures.options import Axis, Count
 
-_LABEL_WIDTH = 18  # characters that fit beside a low panel
+_LABEL_WIDTH = 18  # characters that fit next to a low panel
 
 
 def waveform(

@@ -88,7 +88,7 @@ def _stator(frame: Frame, stator: AnyStator, tip: Point, root: Point) -> str:
 def _carrier(frame: Frame, carried: list[tuple[float, float]]) -> list[str]:
     """Return a band behind stators, of which angle and distance of the root (m) are given, and its spring.
 
-    It runs around the shaft but for the widest gap between two of them, above a third of a turn.
+    It runs around the shaft except for the widest gap between two of them, above a third of a turn.
     """
     if not carried:
         return []

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 CONTACT = ("masked", "kept")
 _SIFTINGS = 5  # in a row with as many zeros as extrema: the S number of Huang and others (2003)
-_EDGE = 0.1  # of the Hann window; below it the signal is all but gone, and so is its phase
+_EDGE = 0.1  # of the Hann window; below it the signal nearly vanishes, and its phase is undefined
 _LEAST = 8  # samples of a span that can be sifted
 
 

@@ -1,4 +1,4 @@
-"""Undamped modes of a symmetric body, exact for the lowest even where a shaft is all but rigid."""
+"""Undamped modes of a symmetric body, accurate for the lowest even where a shaft is nearly rigid."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ NodeForce: TypeAlias = Unbalance | Load
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RotorForces:
-    """What acts on a rotor besides contact."""
+    """Forces on a rotor other than contact."""
 
     unbalance: tuple[Unbalance, ...] = table(doc="Unbalance masses.", default=())
     load: tuple[Load, ...] = table(doc="Constant forces.", default=())

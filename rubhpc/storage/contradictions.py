@@ -1,9 +1,9 @@
-"""Cases of which a journal says two things.
+"""Cases with contradictory lines in a journal.
 
-A line that is repeated says the same twice and loses nothing, though it be a whole journal. A rank computes
-no case twice in one run unless it has declared it missing in between, so that two other lines about a case
-in one journal come from elsewhere, and nobody knows which of them holds. Lines of different runs may
-differ: the later one counts, and processors round differently.
+A repeated line, even a repeated journal, is harmless. A rank computes no case twice in one run unless it has
+declared it missing in between. Other repeated lines of a case in one journal therefore come from elsewhere,
+and it is unknown which is valid. Lines of different runs may differ: the later one counts, and processors
+round differently.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ if TYPE_CHECKING:
 
     from rubhpc.storage.journal import Header
 
-_CLOCK = "wall_time"  # of the measures: it differs whenever a case is computed
+_CLOCK = "wall_time"  # of the measures: it differs at each computation of a case
 _STORED = tuple(b"%d" % status for status in (DONE, DIVERGED))
 
 
 def contradicted(directory: Path, header: Header) -> set[int]:
-    """Flat indices of cases of which a journal says two things, and no later journal says anything."""
+    """Flat indices of cases with contradictory lines in a journal and no line in a later one."""
     found: set[int] = set()
     for path in journals(directory):
         known, contradicted_here = _read(path, header)
@@ -39,7 +39,7 @@ def contradicted(directory: Path, header: Header) -> set[int]:
 
 
 def _read(path: Path, header: Header) -> tuple[set[int], set[int]]:
-    """Cases that a sound journal names, and those of which it says two things."""
+    """Cases that a sound journal names, and those with contradictory lines."""
     known: dict[int, int] = {}
     twice: set[int] = set()
     try:
@@ -68,7 +68,7 @@ def _read(path: Path, header: Header) -> tuple[set[int], set[int]]:
 
 
 def _said(parts: list[bytes], kind: np.dtype[np.void]) -> int | None:
-    """CRC-32 of what a line says of a case, but for the time it took; None where it does not count."""
+    """CRC-32 of a line of a case without the wall time; None where the line does not count."""
     _, name, status, check, measures, reason = parts
     if measures != b"-":
         try:

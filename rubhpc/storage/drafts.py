@@ -1,4 +1,4 @@
-"""Drafts of stores: each is built beside its place and renamed, so that no store is ever incomplete."""
+"""Drafts of stores: each is built next to its place and renamed, so that no store is ever incomplete."""
 
 from __future__ import annotations
 

@@ -171,7 +171,7 @@ def _stage_blocks(new: Store, old: Store, ledger: Ledger, origin: NDArray[np.int
         was_inside = (index < np.array(shape)[:, None]).all(axis=0)
         here = np.where(was_inside, np.ravel_multi_index(tuple(index), shape, mode="clip"), -1)
         if np.array_equal(here, source):
-            continue  # the block stays as it is
+            continue  # the block does not change
         wanted = np.flatnonzero((source >= 0) & is_stored[source])
         if not len(wanted) and not old.has_any_file(start):
             continue

@@ -35,7 +35,7 @@ ORPHAN_PATIENCE = 15.0  # s to wait for a holder whose launcher has ended: it is
 
 
 class InUse(StoreError):  # noqa: N818 - it is a state, not an error
-    """The store, or the part of a study, is another process's for now."""
+    """The store, or the part of a study, is in use by another process."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ def process_state(pid: int) -> tuple[str, int, str] | None:
 
 
 def read_holder(path: Path) -> Holder | None:
-    """Who holds the lock at `path`; None where nobody does."""
+    """Holder of the lock at `path`; None where it is free."""
     holder = read_record(path, Holder)
     if holder is None or not 0 < holder.pid < 2**31 or not 0 <= holder.since < _LATEST:
         return None

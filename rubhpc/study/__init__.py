@@ -1,1 +1,1 @@
-"""What a study says: its tables, axes and cases."""
+"""Study files: tables, axes and cases."""

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from rubhpc.study.speed_law import SpeedLaw
     from rubhpc.study.study import Study
 
-MOST_CASES = 10_000_000  # a larger grid is taken for a mistake: it would fill the memory
+MOST_CASES = 10_000_000  # a larger grid is refused as a mistake: it would fill the memory
 _BLOCK = 16  # cases of a block by default, at most
 
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     Points = np.ndarray[tuple[int, int], np.dtype[np.float64]]
 
 CASE = "case"  # the dimension of all that is drawn
-MOST_DRAWN = 2_000_000  # cases; a larger number is taken for a mistake: it would fill the memory
+MOST_DRAWN = 2_000_000  # cases; a larger number is refused as a mistake: it would fill the memory
 
 
 def cases_per_point(n_range: int) -> int:

@@ -99,7 +99,7 @@ def _markers(
 
 
 def _mark(ax: Axes, letter: str, frequency: float, speed: float, share: float) -> None:
-    """Add a marker beside a line whose height is `share` of the highest."""
+    """Add a marker next to a line whose height is `share` of the highest."""
     low, high = ax.get_ylim()
     span = (high - low) / (1 + _HEIGHT + 0.06)  # that of the rows, of which `waterfall` takes heights
     ax.annotate(
