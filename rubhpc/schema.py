@@ -164,7 +164,7 @@ _MEASURES = (
     _measure("settled", "1", "whether the motion had settled before the record", dtype="int8", flags=SETTLED),
     _measure("contact_iterations", "1", "most iterations that a contact problem took", dtype="int64"),
     _measure("contact_residual", "1", "largest residual of the contact problems, relative"),
-    _measure("transient_revolutions", "1", "revolutions thrown away", dtype="int64"),
+    _measure("transient_revolutions", "1", "revolutions discarded before the record", dtype="int64"),
     _measure("steps", "1", "integration steps", dtype="int64"),
     _measure("scheme", "1", "time integration scheme of the case", dtype="int8", flags=SCHEMES),
     _measure("left_closed_form", "1", "times that short steps took over from closed form", dtype="int64"),
