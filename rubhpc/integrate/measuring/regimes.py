@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from functools import cached_property
 from itertools import islice
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.integrate.measuring.orbit_measures import LONGEST_PERIOD, PERIOD_TOLERANCE, ends_change
+from rubhpc.integrate.measuring.orbit_measures import LONGEST_PERIOD, PERIOD_TOLERANCE
+from rubhpc.integrate.measuring.recorded_orbit import RecordedOrbit, is_torus
 from rubhpc.schema import REGIME
 
 if TYPE_CHECKING:
@@ -31,13 +31,8 @@ TORUS_REVOLUTIONS = 2 * LONGEST_PERIOD  # of a record that may show a torus, or 
 N_FIRST, N_ALL, N_MOST = 16, 64, 256  # spans of measured growth, each if the one before was not conclusive
 CLEAR = 0.05  # per revolution: sign of a larger exponent over 16 spans is certain
 ZERO = 0.01  # per revolution: a smaller exponent counts as zero
-EQUAL = 1e-5  # of the orbit's size: nearer cycles are the same, where no motion can be solved for
-NOISE, ALIKE = 1e-9, 2.0  # of the orbit's size, times the nearest return: counts as nearest
 REAL = 1e-6  # imaginary part below which a multiplier counts as real
 SURE = 2.0  # standard errors: an exponent within them counts as zero
-# A torus: limits of the nearest return, relative to the distance between cycles; of the return after twice as
-# many revolutions, twice as far within 8 %; and of the difference between the halves of the record.
-NEAR, TWICE, EVEN = 0.21, (1.85, 2.16), 1.5
 
 
 class Solution(NamedTuple):
@@ -106,7 +101,7 @@ def regime(
     """
     if not is_contact:
         return Verdict(REGIME.index("no_contact"), period)
-    orbit = _Orbit(vertical, horizontal, samples_per_revolution)
+    orbit = RecordedOrbit(vertical, horizontal, samples_per_revolution)
     periodic = REGIME.index("periodic")
     looks_like = period
     is_long = orbit.n_revolution >= TORUS_REVOLUTIONS
@@ -142,71 +137,10 @@ def regime(
     return Verdict(flag, period if is_settling else 0, exponent, is_reached=not (is_settling and period > 0))
 
 
-class _Orbit:
-    """A recorded orbit, its section and size."""
-
-    def __init__(self, vertical: Floats, horizontal: Floats, samples_per_revolution: int) -> None:
-        self.signals = np.stack([vertical, horizontal])
-        self.n_revolution = vertical.size // samples_per_revolution
-        self.size = math.sqrt(float(self.signals.var(axis=1).sum()))
-        self.section = self.signals[:, ::samples_per_revolution].T
-        self.cycles = self.signals.reshape(2, self.n_revolution, -1).swapaxes(0, 1)
-
-    @cached_property
-    def distances(self) -> Floats:
-        """Mean square distance between all whole cycles, (n_revolution, n_revolution), m2."""
-        vertical, horizontal = self.signals
-        return cycle_distances(vertical, horizontal, vertical.size // self.n_revolution)
-
-    @cached_property
-    def returns(self) -> Floats:
-        """Mean square distance of cycles 1, 2, ... revolutions apart, up to a third of the record, m2."""
-        return returns(self.distances)
-
-    @property
-    def nearest_return(self) -> int:
-        """Revolutions after which this distance is least."""
-        return int(self.returns.argmin()) + 1
-
-    def distances_from(self, solution: Solution) -> Floats:
-        """Distance of each section point from that of a solution, over the size of the orbit."""
-        place = (np.arange(self.n_revolution) - self.n_revolution) % solution.period
-        apart = np.linalg.norm(self.section - solution.section[place], axis=1)
-        return np.asarray(apart / max(self.size, np.finfo(float).tiny))
-
-    def has_equal_ends(self, period: int, tolerance: float = PERIOD_TOLERANCE) -> bool:
-        """Whether the first cycles equal the last ones a whole number of periods later."""
-        change = ends_change(self.cycles.reshape(self.n_revolution, -1), period)
-        return change <= tolerance * self.size * math.sqrt(self.cycles.shape[2])
-
-    def repeats(self, period: int) -> bool:
-        """Whether its cycles are the same a period later and at both ends."""
-        square = self._square_returns[period - 1]
-        return square <= EQUAL**2 * self.size**2 and self.has_equal_ends(period, EQUAL)
-
-    @cached_property
-    def closest_return(self) -> int:
-        """Revolutions after which the cycles return nearest."""
-        return closest_return(self._square_returns, self.size)
-
-    @cached_property
-    def _square_returns(self) -> Floats:
-        """Mean square distance of cycles 1, 2, ... revolutions apart, m2."""
-        n = self.n_revolution
-        longest = max(1, n // 3, min(n // 2, LONGEST_PERIOD))
-        apart = [self.cycles[k:] - self.cycles[: n - k] for k in range(1, longest + 1)]
-        return np.array([(one**2).sum(axis=1).mean() for one in apart])
-
-
-def closest_return(square: Floats, size: float) -> int:
-    """Least n whose mean square distance `square[n - 1]` is nearest within tolerance, for an orbit's size."""
-    return int(np.argmax(square <= ALIKE**2 * square.min() + (NOISE * size) ** 2)) + 1
-
-
 class _Search:
     """The search for a stable motion that a record agrees with or approaches."""
 
-    def __init__(self, orbit: _Orbit) -> None:
+    def __init__(self, orbit: RecordedOrbit) -> None:
         self._orbit = orbit
         self.finds_nothing = True  # neither such a motion nor another one
         self.turns_away = False  # from an unstable motion that the record agrees with, in two directions
@@ -243,7 +177,7 @@ class _Search:
         if found is None:
             return None
         self.finds_nothing = False
-        apart = self._orbit.distances_from(found)
+        apart = self._orbit.distances_from(found.section)
         first, last = apart[: found.period].max(), apart[-found.period :].max()
         if abs(found.multiplier) >= 1.0:
             self.turns_away |= bool(last <= PERIOD_TOLERANCE and abs(found.multiplier.imag) > REAL)
@@ -303,35 +237,3 @@ def by_growth(
 def standard_error(grown: list[float]) -> float:
     """Standard error of the mean of independent growths."""
     return float(np.std(grown)) / math.sqrt(len(grown))
-
-
-def cycle_distances(vertical: Floats, horizontal: Floats, samples_per_revolution: int) -> Floats:
-    """Mean square distance between all whole cycles, (n_revolution, n_revolution), m2."""
-    cycles = np.concatenate([s.reshape(-1, samples_per_revolution) for s in (vertical, horizontal)], axis=1)
-    cycles = cycles - cycles.mean(axis=0)
-    product = cycles @ cycles.T
-    square = np.diag(product)
-    distances: Floats = np.maximum(square[:, np.newaxis] + square - 2.0 * product, 0.0)
-    return distances / samples_per_revolution
-
-
-def returns(distances: Floats) -> Floats:
-    """Mean square distance of cycles 1, 2, ... revolutions apart, up to a third of the record, m2."""
-    return np.array([np.diagonal(distances, n).mean() for n in range(1, len(distances) // 3 + 1)])
-
-
-def is_torus(distances: Floats) -> bool:
-    """Whether the cycles lie on a closed curve and advance along it by the same share each revolution.
-
-    After a number of revolutions that nearly completes rounds of the curve, the cycles are displaced along it
-    by a small amount, and by twice this amount after twice as many. The cycles of chaotic motion return to a
-    neighbourhood, and those of a motion that still settles approach each other.
-    """
-    square = returns(distances)
-    n = int(square.argmin()) + 1
-    once, twice = np.diagonal(distances, n), np.diagonal(distances, 2 * n)
-    first, last = np.array_split(once, 2)
-    near = math.sqrt(once.mean() / (distances.sum() / (distances.size - len(distances))))
-    ratio = math.sqrt(twice.mean() / once.mean())
-    is_even = max(first.mean(), last.mean()) < EVEN**2 * min(first.mean(), last.mean())
-    return near < NEAR and TWICE[0] < ratio < TWICE[1] and bool(is_even)

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from rubhpc.integrate.measuring.orbit_measures import period as period_of
-from rubhpc.integrate.measuring.regimes import Solution, by_growth, cycle_distances, is_torus, regime
+from rubhpc.integrate.measuring.recorded_orbit import cycle_distances, is_torus
+from rubhpc.integrate.measuring.regimes import Solution, by_growth, regime
 from rubhpc.schema import REGIME
 
 SAMPLES, REVOLUTIONS = 64, 64
