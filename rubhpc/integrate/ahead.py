@@ -24,13 +24,14 @@ from rubhpc.integrate.marches.friction import FrictionMarch
 from rubhpc.integrate.measuring.samples import new_accumulator
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
+from rubhpc.integrate.periodic_motions.shooting import shoot
 from rubhpc.integrate.record import State
 from rubhpc.integrate.scheme import Scheme
 from rubhpc.integrate.setup import prepare
 from rubhpc.kernels._jit import cache_of, plain
 from rubhpc.kernels.force_average import add_force
 from rubhpc.kernels.laws import FRICTION_LAWS, is_penalty
-from rubhpc.kernels.revolutions import follow_revolutions
+from rubhpc.kernels.shooting import search_period
 from rubhpc.rig.reading import read_rig
 from rubhpc.study.study import Contact, Integrator
 from rubhpc.threads import VARIABLES
@@ -54,7 +55,7 @@ def compile_ahead(setup: Setup) -> None:
     if march in _asked:
         return
     _asked.add(march)
-    kernels = (follow_revolutions, march.take_change)[: 1 + issubclass(march, FrictionMarch)]
+    kernels = (search_period, march.take_change)[: 1 + issubclass(march, FrictionMarch)]
     is_known = all(cache_of(kernel).exists() for kernel in kernels)
     if not is_known and len(os.sched_getaffinity(0)) > 1 and Path(sys.executable).stem.startswith("python"):
         with suppress(OSError):  # another process has the lock, or no process can be started
@@ -63,7 +64,7 @@ def compile_ahead(setup: Setup) -> None:
 
 def _start(friction_law: str, *, is_soft: bool) -> None:
     """Start the process. It holds the lock, and ends with this process, which holds its input."""
-    path = cache_of(follow_revolutions).parent / "ahead.lock"
+    path = cache_of(search_period).parent / "ahead.lock"
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -108,7 +109,7 @@ def _compile(friction_law: str, *, is_soft: bool) -> None:
     motion = PiecewiseMotion(setup, 1.0, 0.3, State.at_rest(setup.model))
     if motion.has_states:
         motion.march.change(motion.states, 1, 0.0, motion.start.copy())
-    motion.revolve(motion.start, motion.states)
+    shoot(motion, motion.start, motion.states, 1)
 
 
 def _end_with_parent() -> None:

@@ -251,7 +251,7 @@ def _integrate(
 def _pass_directly(
     march: EventDrivenMarch,
     start: Callable[[State], March],
-    begin: Callable[[State, EventDrivenMarch], PiecewiseMotion],
+    begin: Callable[[State | None, EventDrivenMarch], PiecewiseMotion],
     initial: State,
     setup: Setup,
     clearance: float,
@@ -283,7 +283,11 @@ def _pass_directly(
 
 
 def _solve_from(
-    setup: Setup, clearance: float, friction: float, state: State, march: EventDrivenMarch | None = None
+    setup: Setup,
+    clearance: float,
+    friction: float,
+    state: State | None,
+    march: EventDrivenMarch | None = None,
 ) -> PiecewiseMotion:
     """Piecewise motion of a case in closed form; a given march of it is restarted."""
     assert isinstance(setup, ModalSetup)

@@ -19,6 +19,8 @@ _PARTS = {
     "advance_by_steps": "for contact in short steps",
     "advance_curved": "for curved gaps",
     "follow_revolutions": "for periodic motions",
+    "search_period": "for periodic motions",
+    "fill_theory": "for periodic motions",
     "advance_pieces": "for run-ups",
     "advance_friction_pieces": "for run-ups under friction with stick",
     "carry_along": "for neighbouring motions, which distinguish chaos from order",

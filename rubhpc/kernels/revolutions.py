@@ -32,6 +32,7 @@ class PieceModes(NamedTuple):
     mask: Ints  # (p,)
     is_known: Flags  # (p,), whether the mode's row is filled in
     gaps: Ints  # (p,), bits of the switch functions that are gaps
+    n_moving: Ints  # (p,), first coordinates that move with the motion; the others do not
     switch_re: Floats  # (p, s, m)
     switch_im: Floats
     rate_re: Floats  # (p, s, m)

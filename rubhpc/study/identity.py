@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 PHYSICS = 23  # version of the physics: raised whenever a study gives other results than before
 # Versions of what only some studies take, raised in place of PHYSICS and added to it for these.
-MODAL = 4  # method = "modal": modes kept, and `modal_error`
+MODAL = 5  # method = "modal": modes kept, `modal_error`, and last bits of multipliers
 DIRECT = 6  # transient = "direct"
 CHANGING_SPEED = 28  # run-ups and drives
 COULOMB = 15  # set-valued friction

@@ -10,7 +10,7 @@ import rubhpc
 from rubhpc.integrate import ahead
 from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.mode_change import change_contacts
-from rubhpc.kernels.revolutions import follow_revolutions
+from rubhpc.kernels.shooting import search_period
 from rubhpc.study.study import Contact, Integrator
 
 
@@ -78,8 +78,8 @@ def test_what_it_compiles(monkeypatch, friction_law):
     """All kernels are called that a proof calls; one takes the events of sliding pairs itself."""
     called = []
     monkeypatch.setattr(
-        "rubhpc.integrate.periodic_motions.piecewise_motion.follow_revolutions",
-        lambda *arguments: (called.append("follow_revolutions"), follow_revolutions(*arguments))[1],
+        "rubhpc.integrate.periodic_motions.shooting.search_period",
+        lambda *arguments: (called.append("search_period"), search_period(*arguments))[1],
     )
     march = ahead.closed_form_march(setup_of(friction_law=friction_law))
     take_change = march.take_change
@@ -90,7 +90,7 @@ def test_what_it_compiles(monkeypatch, friction_law):
     )
     ahead._compile(friction_law, is_soft=False)
     is_sliding = friction_law == "sliding"
-    assert {"follow_revolutions", *([] if is_sliding else ["change"])} == set(called)
+    assert {"search_period", *([] if is_sliding else ["change"])} == set(called)
     assert (take_change is change_contacts) == is_sliding
 
 

@@ -14,7 +14,8 @@ from rubhpc.integrate.branches.grazing import grazing, grazing_beside, passed, t
 from rubhpc.integrate.branches.point import away_from_events
 from rubhpc.integrate.branches.weak_impact import weakly_impacting
 from rubhpc.integrate.periodic_motions.piecewise_motion import Unfollowed
-from rubhpc.integrate.periodic_motions.shooting import SAME, NotConverged
+from rubhpc.integrate.periodic_motions.shooting import NotConverged
+from rubhpc.kernels.shooting import SAME
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

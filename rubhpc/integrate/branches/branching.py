@@ -13,7 +13,8 @@ from rubhpc.integrate.branches.point import SAME_MOTION, HeldCase, Point, away_f
 from rubhpc.integrate.periodic_motions.family import flow
 from rubhpc.integrate.periodic_motions.piecewise_motion import Unfollowed
 from rubhpc.integrate.periodic_motions.saltation import monodromy
-from rubhpc.integrate.periodic_motions.shooting import CONVERGED, NotConverged, shoot
+from rubhpc.integrate.periodic_motions.shooting import NotConverged, shoot
+from rubhpc.kernels.shooting import CONVERGED
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -48,7 +48,7 @@ MOST_EVENTS = 24, 8  # in a revolution: of one pair, and more for each further o
 
 def pass_directly(
     march: EventDrivenMarch,
-    solve_from: Callable[[State, EventDrivenMarch], PiecewiseMotion],
+    solve_from: Callable[[State | None, EventDrivenMarch], PiecewiseMotion],
     recording: Recording,
     known: KnownMotions | None = None,
 ) -> Passed:
@@ -64,7 +64,7 @@ def pass_directly(
     march : EventDrivenMarch
         The case at its beginning.
     solve_from : callable
-        Makes its piecewise motion from a state, with the march that has come there.
+        Makes its piecewise motion from a state, or from where a march of the case has come.
     known : KnownMotions, optional
         Motions that the case may reach.
     """
@@ -122,12 +122,12 @@ class Candidate:
     @cached_property
     def approach(self) -> Approach:
         """Distances from it."""
-        return Approach(self.orbit.powers, np.repeat([self.piecewise.setup.spin**2, 1.0], self.piecewise.n))
+        return Approach.to(self.piecewise, self.orbit.monodromy)
 
     @cached_property
     def onward(self) -> Onward:
         """Contacts of cases near it."""
-        return Onward(self.piecewise, self.orbit)
+        return Onward(self.piecewise, self.orbit, self.approach)
 
 
 def _candidates(piecewise: PiecewiseMotion, walk: Walk, missed: list[Candidate]) -> Iterator[Candidate]:
@@ -146,11 +146,11 @@ def _candidates(piecewise: PiecewiseMotion, walk: Walk, missed: list[Candidate])
 
 
 def _piecewise(
-    walk: Walk, solve_from: Callable[[State, EventDrivenMarch], PiecewiseMotion]
+    walk: Walk, solve_from: Callable[[State | None, EventDrivenMarch], PiecewiseMotion]
 ) -> PiecewiseMotion | None:
     """What motions of the case are followed with; None where it has no closed form."""
     try:
-        return solve_from(walk.march.final(), walk.march)
+        return solve_from(None, walk.march)
     except NoClosedForm:
         return None
 
@@ -168,8 +168,11 @@ def draws_near(walk: Walk, candidate: Candidate, until: int) -> tuple[bool, str 
     it disobeys the theory in further ones.
     """
     piecewise, orbit, approach = candidate.piecewise, candidate.orbit, candidate.approach
-    doubled = max(1, LOOK // orbit.period).bit_length() - 1
-    span, onward = (1 << doubled) * orbit.period, orbit.powers.of(doubled)  # from one look to the next
+    n_period = max(1, LOOK // orbit.period)
+    span, onward = (
+        n_period * orbit.period,
+        np.linalg.matrix_power(orbit.monodromy, n_period),
+    )  # to the next look
     least = -(-WATCHED // span)
     there = nothing(piecewise.setup) * piecewise.size(orbit.motion)
     looks: list[tuple[float, float, float]] = []  # what it strays, is to lose and loses, as shares
@@ -190,7 +193,7 @@ def draws_near(walk: Walk, candidate: Candidate, until: int) -> tuple[bool, str 
             return True, None
         if last <= untried and _agree(looks, least):
             walk.stand()
-            if candidate.onward.keeps_contacts(apart, approach.periods_to(FAR, apart)):
+            if candidate.onward.keeps_contacts(apart, share=FAR):
                 return True, None
             untried = AGAIN * last
         if is_further and not looks:
@@ -241,9 +244,9 @@ def _search(
 def _periods(piecewise: PiecewiseMotion, passed: Floats, n_revolution: int) -> list[int]:
     """1, and the least number of revolutions after which the motion comes back far nearer than after one."""
     longest = min(len(passed) - 1, n_revolution // PATIENCE, LONGEST_PERIOD)
-    back = [piecewise.size(passed[-1] - passed[-1 - n]) for n in range(1, longest + 1)]
-    nearer = (n for n in range(2, longest + 1) if back[n - 1] <= NEARER * back[0])
-    return [1, *islice(nearer, 1)]
+    energy = np.repeat([piecewise.setup.spin**2, 1.0], piecewise.n)
+    back = (passed[-1] - passed[::-1][1 : longest + 1]) ** 2 @ energy
+    return [1, *(np.flatnonzero(back[1:] <= NEARER**2 * back[:1]) + 2)[:1].tolist()]
 
 
 def _solved(piecewise: PiecewiseMotion, states: int, passed: Floats, period: int) -> Orbit | None:
@@ -259,6 +262,7 @@ def _solved(piecewise: PiecewiseMotion, states: int, passed: Floats, period: int
             least_step=LEAST_STEP,
             most_events=MOST_EVENTS[0] + MOST_EVENTS[1] * (piecewise.q - 1),
             most_residual=CLOSING,
+            watches_turns=False,
         )
     except (NoClosedForm, NotConverged):
         return None

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rubhpc.integrate.periodic_motions.powers import Powers
 from rubhpc.integrate.periodic_motions.saltation import monodromy
+from rubhpc.kernels.linear_theory import Theory, fill_theory
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -21,9 +21,6 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-MOST_SQUARINGS = 60  # of the monodromy matrix, until nothing is left of it
-ROUNDING = float(np.finfo(float).eps)
-MOST_PERIODS = 4000  # that the linear theory is followed
 NEAR = 0.5  # of a motion's size, within which a case is looked at
 WATCHED = 2  # revolutions, at least, over which it must do as the linear theory says
 SHARE = 0.5  # of what that takes from the square of its distance, that it loses at least
@@ -45,26 +42,43 @@ class Approach:
     Its square is `d'P d` with `P = sum over k of (M^k)'W M^k`: the sum over all periods to come of the energy
     of the disturbance d, where M is the monodromy matrix and W the energy's. It falls by `d'W d` in a period.
 
+    Attributes
+    ----------
+    monodromy : (2 n, 2 n)
+    theory : Theory
+        The same, as far as anything is left of a disturbance after one period.
+
     Parameters
     ----------
-    powers : Powers
-        Of the monodromy matrix (2 n, 2 n), whose eigenvalues lie within the unit circle.
+    monodromy : (2 n, 2 n)
+        Its eigenvalues lie within the unit circle.
     energy : (2 n,)
         Diagonal of W.
+    scale : (2 n,), optional
+        What components are multiplied with, to be compared with one another.
     """
 
-    def __init__(self, powers: Powers, energy: Floats) -> None:
-        """Sum the energies, twice as many periods at a time."""
-        self._powers, self._n_power = powers, 1
-        form = np.diag(energy)
-        for k in range(MOST_SQUARINGS):
-            power = powers.of(k)
-            more = power.T @ (form @ power)
-            form = form + more
-            self._n_power = k + 1
-            if more.diagonal().max() <= ROUNDING * form.diagonal().max():  # no entry is larger
-                break
-        self._form = form
+    def __init__(self, monodromy: Floats, energy: Floats, scale: Floats | None = None) -> None:
+        """Sum the energies of all periods."""
+        self.monodromy, m = monodromy, energy.size
+        rooms = np.empty((8, m, m))
+        rank = fill_theory(monodromy, np.sqrt(energy) if scale is None else scale, energy, rooms)
+        self.theory = Theory(
+            rooms[0, :rank].copy(),
+            rooms[1, :rank].copy(),
+            rooms[2, :rank, :rank].copy(),
+            rooms[3, :rank, :rank].copy(),
+        )
+        self._form = self.theory.reading.T @ (self.theory.sums @ self.theory.reading)
+        self._form[np.diag_indices(m)] += energy
+
+    @classmethod
+    def to(cls, piecewise: PiecewiseMotion, monodromy: Floats) -> Approach:
+        """Distances from a motion of a case with this monodromy matrix."""
+        square, pace = piecewise.setup.spin**2, piecewise.bodies.stiffness.diagonal()
+        scale = np.ones(2 * piecewise.n)
+        np.sqrt(np.maximum(pace, square), out=scale[: piecewise.n])
+        return cls(monodromy, np.repeat([square, 1.0], piecewise.n), scale)
 
     def square(self, apart: Floats) -> float:
         """Square of the distance (2 n,)."""
@@ -75,17 +89,6 @@ class Approach:
         found: list[float] = np.einsum("ki,ki->k", apart @ self._form, apart).tolist()
         return found
 
-    def periods_to(self, share: float, apart: Floats) -> int:
-        """Periods until the linear theory leaves no more than a share of the square."""
-        least, n_period = share * self.square(apart), 0
-        if self.square(apart) <= least:
-            return 0
-        for k in range(self._n_power - 1, -1, -1):  # the square falls in every period
-            moved = self._powers.of(k) @ apart
-            if n_period + (1 << k) < MOST_PERIODS and self.square(moved) > least:
-                apart, n_period = moved, n_period + (1 << k)
-        return n_period + 1
-
     def obeys(self, before: Floats, after: Floats, n_period: int) -> bool:
         """Whether the distance (2 n,) some periods later is what the linear theory says, and falls like that.
 
@@ -93,7 +96,7 @@ class Approach:
         """
         predicted = before
         for _ in range(n_period):
-            predicted = self._powers.of(0) @ predicted
+            predicted = self.monodromy @ predicted
         three = np.array([before, after, predicted, after - predicted])
         begun, ended, expected, strays = np.einsum("ki,ij,kj->k", three, self._form, three)
         return bool(strays <= LINEAR**2 * begun and begun - ended >= SHARE * (begun - expected))
@@ -152,9 +155,9 @@ class KnownMotions:
         """Keep a stable motion."""
         turns, motion, states = orbit.revolutions, orbit.motion, orbit.states
         for k, turn in enumerate(turns):
-            powers = Powers(monodromy(piecewise, (*turns[k:], *turns[:k]))) if k else orbit.powers
+            matrix = monodromy(piecewise, (*turns[k:], *turns[:k])) if k else orbit.monodromy
             state = piecewise.march.state_of(motion, piecewise.contact_force(states, motion))
-            approach = Approach(powers, self._energy)
+            approach = Approach.to(piecewise, matrix)
             self._places.append(Place(motion, state, orbit.period, piecewise.size(motion), approach))
             motion, states = turn.end, turn.states
         self._sections = np.array([place.motion for place in self._places])

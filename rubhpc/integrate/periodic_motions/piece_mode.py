@@ -81,6 +81,7 @@ def unknown_modes(tables: ModeTables) -> PieceModes:
         mask=tables.mask,
         is_known=np.zeros(p, dtype=np.bool_),
         gaps=np.empty(p, dtype=np.int64),
+        n_moving=np.empty(p, dtype=np.int64),
         switch_re=tables.switch_re,
         switch_im=tables.switch_im,
         rate_re=tables.rate_re,
@@ -103,7 +104,7 @@ def unknown_modes(tables: ModeTables) -> PieceModes:
 def know(modes: PieceModes, mode: Mode, gaps: int) -> None:
     """Fill in the row of a mode; `gaps` are the bits of its switch functions that are gaps."""
     place, tables = mode.place, mode.tables
-    modes.gaps[place] = gaps
+    modes.gaps[place], modes.n_moving[place] = gaps, mode.moving[-1] + 1
     modes.exponent[place], modes.drift[place] = tables.exponent, tables.drift
     modes.floor[place], modes.kind[place] = tables.floor, tables.kind
     modes.offset[place] = tables.offset

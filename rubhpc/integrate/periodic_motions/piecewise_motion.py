@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -13,7 +12,14 @@ from rubhpc.integrate.marches.closed_form import closed_form_march
 from rubhpc.integrate.marches.friction import FrictionMarch
 from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.periodic_motions.piece_mode import Mode, know, mode_of, unknown_modes
-from rubhpc.integrate.periodic_motions.revolution import Piece, Revolution, copied, cut, first_of, longer
+from rubhpc.integrate.periodic_motions.revolution import (
+    Piece,
+    Revolution,
+    copied,
+    first_of,
+    longer,
+    whole_revolutions,
+)
 from rubhpc.kernels._jit import plain
 from rubhpc.kernels.case_progress import closed_pairs
 from rubhpc.kernels.flow import piece_room
@@ -28,9 +34,11 @@ from rubhpc.kernels.revolutions import (
     PIECE,
     STATES,
     UNSOLVED,
+    PieceRows,
     follow_revolutions,
     piece_rows,
 )
+from rubhpc.kernels.small_changes import ChangeRoom, change_room
 
 if TYPE_CHECKING:
     from rubhpc.integrate.marches.event_driven import EventDrivenMarch
@@ -42,6 +50,7 @@ Ints = NDArray[np.int64]
 Change = Literal["touch", "release", "slip", "stick"]
 
 MOST_EVENTS = 1000  # in a revolution
+FEW_MODES = 4  # that others have read before, and that are read at once
 FEW_PIECES = 32  # that there is room for at first
 STEPS_PER_REVOLUTION = 128  # at least, so that no turn of a gap between two steps is missed
 
@@ -59,15 +68,15 @@ class PiecewiseMotion:
         Where the case begins: its reduced motion, and the states of its pairs.
     turn : float, s
         Duration of a revolution.
-    rim_speed : (q,), m/s
-        Speed of each rim without vibration.
+    highest, longest : int
+        Level of the longest tabulated steps, and of those between which no turn of a gap is missed.
 
     Parameters
     ----------
-    initial : State
-        Where the case begins; `integrate.initial_state.fit_to_gaps` makes it fit.
+    initial : State or None
+        Where the case begins; `integrate.initial_state.fit_to_gaps` makes it fit. None: where a march stands.
     march : EventDrivenMarch, optional
-        Of the case, that is needed no more: it is started anew.
+        Of the case, that is needed no more: it is started anew, unless it stands where the case begins.
     """
 
     def __init__(
@@ -75,31 +84,30 @@ class PiecewiseMotion:
         setup: ModalSetup,
         clearance: float,
         friction: float,
-        initial: State,
+        initial: State | None,
         march: EventDrivenMarch | None = None,
     ) -> None:
         """Take a case in closed form; `NoClosedForm` where it has none."""
         made = closed_form_march(setup)
         self.has_states = issubclass(made, FrictionMarch)
         if march is None:
+            assert initial is not None
             march = made(setup, clearance, friction, initial, None)
-        else:
+        elif initial is not None:
             march.start_again(initial)
         self.march = march
         self.setup = setup
         self.turn = setup.interval * setup.samples_per_revolution
         self.bodies = self.march.bodies
         self.n, self.q = self.bodies.stiffness.shape[0], len(setup.model.stators)
-        self.rim_speed = np.array([stator.radius for stator in setup.model.stators]) * abs(setup.spin)
         self.n_switch = self.march.tables.switch_re.shape[1]
-        self.impacts: dict[bytes, tuple[Floats, Floats]] = {}  # those met (`saltation.Impact`)
         self._modes: dict[int, Mode] = {}
+        self._change_rooms: dict[tuple[int, int], ChangeRoom] = {}
         self._take_tables()
         self._rows = piece_rows(FEW_PIECES, 2 * self.n, self.n_switch, self.q)
         clock = self.march.clock
-        self._longest = min(
-            self._tables.power_re.shape[1] - 1, int(math.log2(self.turn / STEPS_PER_REVOLUTION / clock.tick))
-        )
+        self.highest = self._tables.power_re.shape[1] - 1
+        self.longest = min(self.highest, int(math.log2(self.turn / STEPS_PER_REVOLUTION / clock.tick)))
         self.start = self.march.motion_of(*self.march.place())
         self.states = plain(closed_pairs)(self.march.progress, self._tables)
 
@@ -127,7 +135,7 @@ class PiecewiseMotion:
             if self.march.tables is not self._tables:
                 self._take_tables()
             self._modes[states] = mode = mode_of(self.march, states)
-            know(self._known, mode, self.march.gaps_watched(states))
+            know(self.known, mode, self.march.gaps_watched(states))
         return self._modes[states]
 
     def enter(self, mode: Mode, time: float, motion: Floats) -> Floats:
@@ -184,22 +192,18 @@ class PiecewiseMotion:
             elif outcome == FULL:
                 self._rows = longer(self._rows)
             elif outcome == AT_EVENT:
-                self._take_event(reached, passed, motion)
-            elif outcome == BEYOND:
-                raise Unfollowed(f"a displacement passes {self.setup.displacement_limit:.3g} m")
-            elif outcome == UNSOLVED:
-                raise Unfollowed("no contact forces that obey the laws were found")
+                self.take_event(self._rows, reached, passed, motion)
             else:
-                raise Unfollowed(f"more than {most_events} events in a revolution")
+                raise Unfollowed(self.why_unfollowed(outcome, most_events))
             outcome = follow_revolutions(
-                self._known,
+                self.known,
                 self.bodies,
-                self._room,
-                self._coordinates,
+                self.room,
+                self.coordinates,
                 self.setup.spin,
                 clock.tick,
                 clock.search_level,
-                self._longest,
+                self.longest,
                 begin,
                 end,
                 self.march.moment,
@@ -212,22 +216,32 @@ class PiecewiseMotion:
                 least,
                 *self.march.change_work,
             )
-        rows = copied(self._rows, int(reached[PIECE]))
-        ends = (np.flatnonzero(rows.states[:, 1] == 0) + 1).tolist()
-        return [
-            Revolution(rows=cut(rows, first, last), least_gap=least[i, 0], least_force=least[i, 1])
-            for i, (first, last) in enumerate(pairwise([0, *ends]))
-        ]
+        return whole_revolutions(copied(self._rows, int(reached[PIECE])), least)
 
-    def _take_event(self, reached: Ints, passed: Floats, motion: Floats) -> None:
-        """Take the event that ends the last piece."""
+    def why_unfollowed(self, outcome: int, most_events: int) -> str:
+        """Why a motion is not followed further, by the outcome of a kernel."""
+        if outcome == BEYOND:
+            return f"a displacement passes {self.setup.displacement_limit:.3g} m"
+        if outcome == UNSOLVED:
+            return "no contact forces that obey the laws were found"
+        return f"more than {most_events} events in a revolution"
+
+    def take_event(self, rows: PieceRows, reached: Ints, passed: Floats, motion: Floats) -> None:
+        """Take the event that ends the last piece, which `follow_revolutions` has left."""
         k, angle = int(reached[PIECE]) - 1, self.setup.spin * passed[0]
-        states, crossing = self._rows.states[k, :2].tolist()
+        states, crossing = rows.states[k, :2].tolist()
         after = self.march.change(states, crossing, angle, motion)
         if after < 0:
-            raise Unfollowed("no contact forces that obey the laws were found")
-        self._rows.motions[k, AFTER], self._rows.given[k] = motion, self.march.given
-        self._rows.states[k, 3] = reached[STATES] = after
+            raise Unfollowed(self.why_unfollowed(UNSOLVED, 0))
+        rows.motions[k, AFTER], rows.given[k] = motion, self.march.given
+        rows.states[k, 3] = reached[STATES] = after
+
+    def change_room(self, k: int) -> ChangeRoom:
+        """Room in which k small changes are carried; the same each time."""
+        width = self._tables.switch_re.shape[2]
+        if (width, k) not in self._change_rooms:
+            self._change_rooms[width, k] = change_room(width, self.n, self.q, k)
+        return self._change_rooms[width, k]
 
     def contact_force(self, states: int, motion: Floats) -> Floats:
         """Force of each pair (q,), N, at the angle 0; of a closed one at least the smallest number."""
@@ -261,5 +275,8 @@ class PiecewiseMotion:
         self._modes.clear()
         self._tables = self.march.tables
         width = self._tables.switch_re.shape[2]
-        self._room, self._coordinates = piece_room(self.n_switch, width), np.empty((2, 2, width))
-        self._known = unknown_modes(self._tables)
+        self.room, self.coordinates = piece_room(self.n_switch, width), np.empty((2, 2, width))
+        self.known = unknown_modes(self._tables)
+        if len(self.march.derived) <= FEW_MODES:  # kernels would ask for them one by one
+            for states in sorted(self.march.derived.keys() & set(self._tables.mask.tolist())):
+                self.mode(states)

@@ -146,6 +146,7 @@ def _solution(
             most_iterations=most_iterations,
             least_step=least_step,
             most_events=MOST_EVENTS // period,
+            watches_turns=False,
         )
     except (NoClosedForm, NotConverged):
         return None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -130,6 +131,15 @@ def first_of(crossing: int) -> int:
     return (crossing & -crossing).bit_length() - 1
 
 
+def whole_revolutions(rows: PieceRows, least: Floats) -> list[Revolution]:
+    """Revolutions of rows, each ending with a piece without an event; least values (r, 2, q)."""
+    ends = (np.flatnonzero(rows.states[:, 1] == 0) + 1).tolist()
+    return [
+        Revolution(rows=cut(rows, first, last), least_gap=least[i, 0], least_force=least[i, 1])
+        for i, (first, last) in enumerate(pairwise([0, *ends]))
+    ]
+
+
 def cut(rows: PieceRows, first: int, last: int) -> PieceRows:
     """Rows from the first up to the last, which is not among them."""
     return PieceRows(
@@ -139,6 +149,11 @@ def cut(rows: PieceRows, first: int, last: int) -> PieceRows:
         rates=rows.rates[first:last],
         given=rows.given[first:last],
     )
+
+
+def joined(rows: list[PieceRows]) -> PieceRows:
+    """Return rows one after another."""
+    return PieceRows(*(np.concatenate(part) for part in zip(*rows, strict=True))) if rows[1:] else rows[0]
 
 
 def copied(rows: PieceRows, k: int) -> PieceRows:

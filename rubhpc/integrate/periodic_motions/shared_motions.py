@@ -43,7 +43,7 @@ def shared_motions(
     friction: float,
     recording: Recording,
     start: Callable[[State], March],
-    solve_from: Callable[[State, EventDrivenMarch], PiecewiseMotion],
+    solve_from: Callable[[State | None, EventDrivenMarch], PiecewiseMotion],
 ) -> tuple[KnownMotions, bool]:
     """Return the stable periodic motions that a fixed set of starts reaches, and whether they are new.
 
@@ -81,7 +81,7 @@ def _add(
     state: State,
     recording: Recording,
     start: Callable[[State], March],
-    solve_from: Callable[[State, EventDrivenMarch], PiecewiseMotion],
+    solve_from: Callable[[State | None, EventDrivenMarch], PiecewiseMotion],
 ) -> bool:
     """Add the motion that a start reaches, if it is not known; returns whether it reaches one."""
     try:

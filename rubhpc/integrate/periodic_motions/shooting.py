@@ -9,9 +9,41 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.periodic_motions.piecewise_motion import MOST_EVENTS, PiecewiseMotion, Unfollowed
-from rubhpc.integrate.periodic_motions.powers import Powers
-from rubhpc.integrate.periodic_motions.saltation import tangents
+from rubhpc.integrate.periodic_motions.piecewise_motion import (
+    FEW_PIECES,
+    MOST_EVENTS,
+    PiecewiseMotion,
+    Unfollowed,
+)
+from rubhpc.integrate.periodic_motions.revolution import copied, longer, whole_revolutions
+from rubhpc.kernels.revolutions import (
+    AT_EVENT,
+    FULL,
+    MODE_UNKNOWN,
+    STATES,
+    piece_rows,
+)
+from rubhpc.kernels.shooting import (
+    BEGINS,
+    BEST,
+    CARRIED,
+    FAR,
+    FOLLOWING,
+    FOUND,
+    ITERATION,
+    LOST,
+    N_PIECE,
+    N_SHORTEST,
+    NEXT,
+    RESIDUAL,
+    SINGULAR,
+    STALLED,
+    STEPPING,
+    TOO_LONG,
+    TRIED,
+    new_search,
+    search_period,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -21,11 +53,9 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
 
-CONVERGED = 1e-10  # residual over the size of the motion
 MOST_ITERATIONS = 30
-FAST = 0.05  # ratio of two residuals below which the derivative of the iteration before serves once more
 LEAST_STEP = 1 / 128  # share of Newton's step that is tried last
-SAME = 1e-7  # of the motion's size: sections that close are no farther apart
+NEAR_GRAZING = 1e-2  # of spin times clearance: a touch that is slower grazes
 
 
 class NotConverged(Exception):  # noqa: N818 - a state of the search; `periodic` raises an error for users
@@ -42,9 +72,8 @@ class Orbit:
         Reduced displacements and velocities with the shaft at its angle 0, and the states of the pairs then.
     revolutions : tuple of Revolution
         As many as its period.
-    tangents : list of (2 n, 2 n)
-        Derivatives of the motion after each piece of its period by that at the beginning; the last one is the
-        monodromy matrix.
+    monodromy : (2 n, 2 n)
+        Derivative of the motion after a period by that before it.
     residual : float
         Distance of the two over the size of the motion.
     iterations : int
@@ -54,7 +83,7 @@ class Orbit:
     motion: Floats
     states: int
     revolutions: tuple[Revolution, ...]
-    tangents: list[Floats]
+    monodromy: Floats
     residual: float
     iterations: int
 
@@ -62,16 +91,6 @@ class Orbit:
     def period(self) -> int:
         """Revolutions."""
         return len(self.revolutions)
-
-    @property
-    def monodromy(self) -> Floats:
-        """Derivative of the motion after a period by that before it, (2 n, 2 n)."""
-        return self.tangents[-1]
-
-    @cached_property
-    def powers(self) -> Powers:
-        """Powers of the monodromy matrix."""
-        return Powers(self.monodromy)
 
     @cached_property
     def multipliers(self) -> Complexes:
@@ -85,20 +104,6 @@ def floquet_multipliers(monodromy: Floats) -> Complexes:
     return found[np.lexsort((-found.imag, -np.abs(found)))]
 
 
-class _Trial:
-    """A beginning, where it leads in the revolutions asked for, and how far that is from it."""
-
-    def __init__(
-        self, piecewise: PiecewiseMotion, motion: Floats, states: int, period: int, most_events: int
-    ) -> None:
-        self.motion, self.states = motion, states
-        self.revolutions = piecewise.follow(motion, states, period, most_events)
-        self.end, self.end_states = self.revolutions[-1].end, self.revolutions[-1].states
-        self.defect = self.end - motion
-        scale = max(piecewise.size(self.end), np.finfo(float).tiny)
-        self.residual = piecewise.size(self.defect) / scale
-
-
 def shoot(
     piecewise: PiecewiseMotion,
     motion: Floats,
@@ -109,11 +114,9 @@ def shoot(
     least_step: float = LEAST_STEP,
     most_events: int = MOST_EVENTS,
     most_residual: float = math.inf,
+    watches_turns: bool = True,
 ) -> Orbit:
-    """Find the periodic motion near a beginning.
-
-    Newton's method on `P(x) - x = 0`, with the exact derivative of P, the motion after `period` revolutions.
-    A step is shortened until the residual falls.
+    """Find the periodic motion near a beginning, by Newton's method (`kernels.shooting.search_period`).
 
     Parameters
     ----------
@@ -127,6 +130,8 @@ def shoot(
         In a revolution; a motion with more is not followed.
     most_residual : float
         Of the beginning: from one that is farther from closing nothing is sought.
+    watches_turns : bool
+        Whether steps are short enough for `least_gap` and `least_force` of the revolutions.
 
     Returns
     -------
@@ -138,70 +143,128 @@ def shoot(
     NotConverged
         No motion was found that closes to 1e-10 of its size.
     """
-    identity = np.eye(2 * piecewise.n)
+    shot = _Shot(piecewise, motion, states, period, watches_turns=watches_turns)
     try:
-        trial = _Trial(piecewise, motion, states, period, most_events)
+        outcome = shot.run(most_events, most_iterations, least_step, most_residual)
     except Unfollowed as problem:
         raise NotConverged(str(problem)) from None
-    if not trial.residual <= most_residual:
-        raise NotConverged(f"the initial state is far from periodic, residual {trial.residual:.2g}")
-    derivative: list[Floats] | None = None
-    is_fresh = False
-    for iteration in range(most_iterations + 1):
-        if trial.end_states == trial.states and trial.residual <= CONVERGED:
-            return _settled(piecewise, trial, derivative if is_fresh else None, iteration)
-        if iteration == most_iterations:
-            break
-        if derivative is None:
-            derivative, is_fresh = tangents(piecewise, trial.revolutions), True
-        step = _solved(identity - derivative[-1], trial.defect)
-        better = _shortened(piecewise, trial, step, least_step, most_events)
-        if better is None:
-            if not is_fresh:
-                derivative = None
-                continue
-            usual = abs(piecewise.setup.spin * piecewise.bodies.clearance)
-            raise NotConverged(
-                f"Newton's method stalls at a residual of {trial.residual:.2g}{_grazing(trial, usual)}"
-            )
-        if better.residual > FAST * trial.residual:
-            derivative = None
-        is_fresh, trial = False, better
-    raise NotConverged(f"no convergence within {most_iterations} iterations, residual {trial.residual:.2g}")
+    residual, now = float(shot.search.share[RESIDUAL]), shot.search.now
+    if outcome == FOUND:
+        return shot.orbit()
+    if outcome == FAR:
+        raise NotConverged(f"the initial state is far from periodic, residual {residual:.2g}")
+    if outcome == STALLED:
+        usual = abs(piecewise.setup.spin * piecewise.bodies.clearance)
+        grazing = _grazing(shot.revolutions(int(now[N_PIECE])), usual)
+        raise NotConverged(f"Newton's method stalls at a residual of {residual:.2g}{grazing}")
+    if outcome == TOO_LONG:
+        raise NotConverged(f"no convergence within {most_iterations} iterations, residual {residual:.2g}")
+    raise NotConverged(piecewise.why_unfollowed(outcome, most_events))
 
 
-def _solved(matrix: Floats, defect: Floats) -> Floats:
-    """Newton's step; the shortest where the matrix is singular, at a fold."""
-    try:
-        return np.asarray(np.linalg.solve(matrix, defect))
-    except np.linalg.LinAlgError:
-        return np.asarray(np.linalg.lstsq(matrix, defect, rcond=1e-12)[0])
+class _Shot:
+    """A search under way: what its kernel works with."""
 
+    def __init__(
+        self, piecewise: PiecewiseMotion, motion: Floats, states: int, period: int, *, watches_turns: bool
+    ) -> None:
+        self._piecewise, width = piecewise, 2 * piecewise.n
+        self._longest = piecewise.longest if watches_turns else piecewise.highest
+        self.search = new_search(width)
+        self._reached = np.array([0, states, 0, 0])
+        self._passed, self._motion = np.zeros(1), motion.copy()
+        self._least = np.full((period, 2, piecewise.q), np.inf)
+        k = FEW_PIECES * period
+        self._rows = [piece_rows(k, width, piecewise.n_switch, piecewise.q) for _ in range(2)]
+        self.search.tried[:] = motion
+        self.search.now[TRIED] = states
 
-def _shortened(
-    piecewise: PiecewiseMotion, trial: _Trial, step: Floats, least_step: float, most_events: int
-) -> _Trial | None:
-    """Return the trial a share of a step further that is nearer to closing; None where none is.
+    def run(self, most_events: int, most_iterations: int, least_step: float, most_residual: float) -> int:
+        """Search to an outcome, and do on the way what the kernel leaves to its caller.
 
-    It begins with the states of the trial before, or with those in which that ended.
-    """
-    share, period = 1.0, len(trial.revolutions)
-    while share >= least_step:
-        for states in dict.fromkeys((trial.end_states, trial.states)):
+        Raises
+        ------
+        Unfollowed
+            The beginning cannot be followed.
+        """
+        now = self.search.now
+        while True:
+            outcome = self._call(most_events, most_iterations, least_step, most_residual)
+            under_way = 1 - int(now[BEST])
             try:
-                found = _Trial(piecewise, trial.motion + share * step, states, period, most_events)
+                if outcome == MODE_UNKNOWN:
+                    self._piecewise.mode(self._wanted())
+                elif outcome == FULL:
+                    self._rows[under_way] = longer(self._rows[under_way])
+                elif outcome == AT_EVENT:
+                    self._piecewise.take_event(
+                        self._rows[under_way], self._reached, self._passed, self._motion
+                    )
+                elif outcome == SINGULAR:  # at a fold
+                    matrix = np.eye(self._motion.size) - self.search.columns
+                    self.search.step[:] = np.linalg.lstsq(matrix, self.search.defect, rcond=1e-12)[0]
+                    now[NEXT] = STEPPING
+                else:
+                    return outcome
             except Unfollowed:
-                continue
-            if found.residual < (1.0 - 0.25 * share) * trial.residual:
-                return found
-        share *= 0.5
-    return None
+                if now[N_PIECE] == 0 or now[NEXT] != FOLLOWING:
+                    raise
+                now[NEXT] = LOST
+
+    def orbit(self) -> Orbit:
+        """The motion that was found, over its shortest period."""
+        now = self.search.now
+        return Orbit(
+            motion=self.search.motion,
+            states=int(now[BEGINS]),
+            revolutions=tuple(self.revolutions(int(now[N_SHORTEST]))),
+            monodromy=self.search.columns,
+            residual=float(self.search.share[RESIDUAL]),
+            iterations=int(now[ITERATION]),
+        )
+
+    def revolutions(self, n_piece: int) -> list[Revolution]:
+        """Those of the best trial, up to a piece."""
+        return whole_revolutions(copied(self._rows[int(self.search.now[BEST])], n_piece), self._least)
+
+    def _wanted(self) -> int:
+        """States of the pairs whose contact mode the kernel asks for."""
+        now = self.search.now
+        if now[NEXT] == FOLLOWING:
+            return int(self._reached[STATES])
+        return int(self._rows[int(now[BEST])].states[now[CARRIED], 0])
+
+    def _call(self, most_events: int, most_iterations: int, least_step: float, most_residual: float) -> int:
+        piecewise, clock = self._piecewise, self._piecewise.march.clock
+        return search_period(
+            piecewise.known,
+            piecewise.bodies,
+            piecewise.room,
+            piecewise.coordinates,
+            piecewise.setup.spin,
+            clock.tick,
+            clock.search_level,
+            self._longest,
+            piecewise.turn,
+            piecewise.march.moment,
+            piecewise.has_states,
+            most_events,
+            most_iterations,
+            least_step,
+            most_residual,
+            self.search,
+            piecewise.change_room(self._motion.size),
+            self._reached,
+            self._passed,
+            self._motion,
+            self._rows[0],
+            self._rows[1],
+            self._least,
+            *piecewise.march.change_work,
+        )
 
 
-NEAR_GRAZING = 1e-2  # of spin times clearance: a touch that is slower grazes
-
-
-def _grazing(trial: _Trial, usual: Floats) -> str:
+def _grazing(revolutions: list[Revolution], usual: Floats) -> str:
     """What a failure has to do with grazing; "" where nothing.
 
     `usual` (q,), m/s, are spin times clearance of each pair. A gap that opens where it is found closed, since
@@ -209,34 +272,9 @@ def _grazing(trial: _Trial, usual: Floats) -> str:
     """
     slow = [
         float(speed)
-        for revolution in trial.revolutions
+        for revolution in revolutions
         for piece in revolution.pieces
         for pair, speed in zip(piece.touching, piece.approach, strict=True)
         if 0.0 <= speed < NEAR_GRAZING * usual[pair]
     ]
     return f": a contact grazes, its speed of approach is {min(slow):.2g} m/s" if slow else ""
-
-
-def _settled(
-    piecewise: PiecewiseMotion, trial: _Trial, derivative: list[Floats] | None, iterations: int
-) -> Orbit:
-    """Return the orbit of a converged trial, over its shortest period."""
-    period = len(trial.revolutions)
-    beginnings = [trial.motion, *(revolution.end for revolution in trial.revolutions)]
-    size = SAME * piecewise.size(trial.motion)
-    primitive = next(
-        n
-        for n in range(1, period + 1)
-        if period % n == 0 and piecewise.size(beginnings[n] - trial.motion) <= size
-    )
-    revolutions = tuple(trial.revolutions[:primitive])
-    if derivative is None or primitive != period:
-        derivative = tangents(piecewise, revolutions)
-    return Orbit(
-        motion=trial.motion,
-        states=trial.states,
-        revolutions=revolutions,
-        tangents=derivative,
-        residual=trial.residual,
-        iterations=iterations,
-    )

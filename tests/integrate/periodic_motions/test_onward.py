@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rubhpc.integrate.periodic_motions import direct
+from rubhpc.integrate.periodic_motions.known_motions import Approach
 from rubhpc.integrate.periodic_motions.onward import PER_REVOLUTION, Onward
 from rubhpc.simulate import simulate
 
@@ -32,6 +33,10 @@ def settled():
     return piecewise, orbit, piecewise.march.reduced(first) - orbit.motion
 
 
+def onward_of(piecewise, orbit):
+    return Onward(piecewise, orbit, Approach.to(piecewise, orbit.monodromy))
+
+
 def sequence(piecewise, orbit, apart):
     return [piece.states for piece in piecewise.revolve(orbit.motion + apart, orbit.states).pieces]
 
@@ -39,24 +44,24 @@ def sequence(piecewise, orbit, apart):
 def test_gaps_and_forces_nearby_are_those_of_the_motion_to_first_order(settled):
     """Of a thousandth of the distance, where a piece begins at the section: no event before moves it."""
     piecewise, orbit, apart = settled
-    onward, small = Onward(piecewise, orbit), 1e-3 * apart
-    first = onward._watched[0]
+    onward, small = onward_of(piecewise, orbit), 1e-3 * apart
+    watched, n = onward.watched, int(onward.watched.parts[0, 1])
     piece = orbit.revolutions[0].pieces[0]
     mode = piecewise.mode(piece.states)
     z = piecewise.enter(mode, 0.0, orbit.motion + small)
     exponent = mode.tables.exponent[0] + 1j * mode.tables.exponent[1]
-    times = piece.duration * (np.arange(first.value.size) + 0.5) / first.value.size
+    times = piece.duration * (np.arange(n) + 0.5) / n
     row = mode.tables.switch_re[0] + 1j * mode.tables.switch_im[0]
     nearby = (np.exp(times[:, None] * exponent) * (z[0] + 1j * z[1]) @ row).real
-    assert nearby == pytest.approx(first.value + first.rows @ small, rel=1e-9)
-    assert nearby != pytest.approx(first.value, rel=1e-6)
+    assert nearby == pytest.approx(watched.value[:n] + small @ watched.change[:, :n], rel=1e-9)
+    assert nearby != pytest.approx(watched.value[:n], rel=1e-6)
 
 
 def test_another_contact_comes_where_it_is_foreseen(settled):
     """Least share of the distance at which the order of contacts is another one: 1.11 predicted, 1.44 met."""
     piecewise, orbit, apart = settled
     apart = apart * piecewise.size(orbit.motion) / piecewise.size(apart)
-    onward, usual = Onward(piecewise, orbit), sequence(piecewise, orbit, 0.0 * apart)
+    onward, usual = onward_of(piecewise, orbit), sequence(piecewise, orbit, 0.0 * apart)
     shares = np.arange(0.1, 3.0, 0.1)
     foreseen = [onward.keeps_contacts(share * apart, 1) for share in shares]
     met = [sequence(piecewise, orbit, share * apart) == usual for share in shares]
@@ -69,7 +74,7 @@ def test_another_contact_comes_where_it_is_foreseen(settled):
 def test_all_periods_ahead_are_looked_at(settled):
     """A disturbance that meets another contact only when its phase has come round."""
     piecewise, orbit, apart = settled
-    onward, shares = Onward(piecewise, orbit), np.arange(0.2, 8.0, 0.2)
+    onward, shares = onward_of(piecewise, orbit), np.arange(0.2, 8.0, 0.2)
     random, later = np.random.default_rng(3), 0
     unit = np.repeat([1.0 / piecewise.setup.spin, 1.0], piecewise.n)
     for _ in range(3):
@@ -86,6 +91,7 @@ def test_all_periods_ahead_are_looked_at(settled):
 
 def test_times_are_spread_over_the_revolution(settled):
     piecewise, orbit, _ = settled
-    counts = [one.value.size for one in Onward(piecewise, orbit)._watched]
+    parts = onward_of(piecewise, orbit).watched.parts
+    counts = (parts[:, 1] - parts[:, 0]).tolist()
     assert len(counts) == len(orbit.revolutions[0].pieces)
     assert sum(counts) == pytest.approx(PER_REVOLUTION, abs=len(counts))

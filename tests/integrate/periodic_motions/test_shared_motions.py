@@ -9,7 +9,6 @@ from rubhpc import simulate
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.periodic_motions import shared_motions
 from rubhpc.integrate.periodic_motions.known_motions import Approach
-from rubhpc.integrate.periodic_motions.powers import Powers
 from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import read_rig, with_keys
 from rubhpc.schema import REGIME
@@ -87,7 +86,7 @@ def test_one_case_by_itself_has_the_same_bits():
 def test_near_means_that_the_linear_theory_holds():
     """A map whose second order sends far disturbances elsewhere."""
     monodromy = np.array([[0.5, 0.3], [0.0, 0.6]])
-    approach = Approach(Powers(monodromy), np.ones(2))
+    approach = Approach(monodromy, np.ones(2))
 
     def after(apart, n):
         for _ in range(n):

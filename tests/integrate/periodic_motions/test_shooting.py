@@ -49,7 +49,7 @@ def test_contact_that_grazes_is_named():
 
     def trial(*speeds):
         pieces = [SimpleNamespace(touching=np.array([0]), approach=np.array([speed])) for speed in speeds]
-        return SimpleNamespace(revolutions=[SimpleNamespace(pieces=pieces)])
+        return [SimpleNamespace(pieces=pieces)]
 
     usual = np.array([0.01])
     assert _grazing(trial(0.4, 0.3 * NEAR_GRAZING * 0.01), usual) == (

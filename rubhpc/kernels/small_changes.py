@@ -1,0 +1,281 @@
+"""Small changes of a motion through its pieces: exponentials, and saltation matrices at events."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit_apart_sum, jit_inline_sum, jit_lean_sum
+from rubhpc.kernels.contact_modes import Reduced, add_rows, find_mode
+from rubhpc.kernels.elimination import eliminate
+from rubhpc.kernels.flow import GRADIENT, RATE_BEGUN, RATE_ENDED, lowest_bit
+from rubhpc.kernels.mode_change import AT_REST, product
+from rubhpc.kernels.revolutions import AFTER, PieceModes, PieceRows
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+ALL_CARRIED = -1
+NO_IMPULSE = 1e-12  # of the largest impulse of an event
+STOPPED = 1e-9  # of the rim's speed: what slips less after an impact sticks
+
+
+class ChangeRoom(NamedTuple):
+    """Work space for k small changes; m coordinates, n reduced degrees, q pairs."""
+
+    z_re: Floats  # (m, k), their coordinates
+    z_im: Floats
+    weight: Floats  # (2, 2 n), what a motion adds to a coordinate
+    row: Floats  # (k,), what they do to a switch function, over its rate
+    jump: Floats  # (2 n,), rate of the motion after an event less what the impact makes of that before
+    direction: Floats  # (2 q, n), of the impulses of an impact
+    rows: Floats  # (2 q, 2 q + n), these impulses by the velocities before, behind a matrix
+    scale: Floats  # (2 q,)
+    impulse: Floats  # (2 q, k)
+
+
+def change_room(m: int, n: int, q: int, k: int) -> ChangeRoom:
+    """Room for k changes."""
+    return ChangeRoom(
+        z_re=np.empty((m, k)),
+        z_im=np.empty((m, k)),
+        weight=np.empty((2, 2 * n)),
+        row=np.empty(k),
+        jump=np.empty(2 * n),
+        direction=np.empty((2 * q, n)),
+        rows=np.empty((2 * q, 2 * q + n)),
+        scale=np.empty(2 * q),
+        impulse=np.empty((2 * q, k)),
+    )
+
+
+@jit_lean_sum
+def carry_pieces(
+    modes: PieceModes,
+    reduced: Reduced,
+    has_states: bool,
+    rows: PieceRows,
+    first: int,
+    last: int,
+    room: ChangeRoom,
+    columns: Floats,
+    kept: Floats,
+) -> int:
+    """Carry small changes through the pieces from `first` up to `last`, which is not among them.
+
+    Through a piece they go as `Re(M exp(Lambda t) E)`, with the entry E into the contact mode and its motions
+    M; an event applies `S = DR + (f+ - DR f-) (grad h)^T / (dh/dt)`, with h the switch function that
+    vanishes, dh/dt its rate before the event, f the rate of the motion and DR the derivative of the impact
+    (Leine and Nijmeijer 2004).
+
+    Parameters
+    ----------
+    has_states : bool
+        Whether friction is set-valued.
+    columns : (2 n, k)
+        Changes of the motion with which piece `first` begins; in place.
+    kept : (p, 2 n, k)
+        Filled in: what they are after each piece and the event that ends it; of none where p is 0.
+
+    Returns
+    -------
+    int
+        The piece before which they are, whose contact mode is not known; or `ALL_CARRIED`.
+    """
+    for k in range(first, last):
+        place = find_mode(modes.mask, rows.states[k, 0])
+        if place < 0 or not modes.is_known[place]:
+            return k
+        move_changes(
+            modes.n_moving[place],
+            modes.exponent[place],
+            modes.enter_re[place],
+            modes.enter_im[place],
+            modes.shape_re[place],
+            modes.shape_im[place],
+            rows.times[k, 1],
+            room,
+            columns,
+        )
+        if rows.states[k, 1] != 0 and (has_states or rows.states[k, 2] != 0):
+            saltate(
+                reduced,
+                has_states,
+                rows.states[k],
+                rows.motions[k],
+                rows.rates[k],
+                rows.given[k],
+                rows.motions[k + 1, RATE_BEGUN],
+                room,
+                columns,
+            )
+        if kept.shape[0] > 0:
+            for row in range(columns.shape[0]):
+                for j in range(columns.shape[1]):
+                    kept[k - first, row, j] = columns[row, j]
+    return ALL_CARRIED
+
+
+@jit_lean_sum
+def move_changes(
+    n_moving: int,
+    exponent: Floats,
+    enter_re: Floats,
+    enter_im: Floats,
+    shape_re: Floats,
+    shape_im: Floats,
+    duration: float,
+    room: ChangeRoom,
+    columns: Floats,
+) -> None:
+    """Carry changes (2 n, k) for a time, s, in a contact mode whose first `n_moving` coordinates move."""
+    n_column, z_re, z_im = columns.shape[1], room.z_re, room.z_im
+    from_re, from_im = room.weight[0], room.weight[1]
+    for i in range(n_moving):
+        growth = np.exp(exponent[0, i] * duration)
+        turn = exponent[1, i] * duration
+        cosine, sine = growth * np.cos(turn), growth * np.sin(turn)
+        re, im = z_re[i], z_im[i]
+        for j in range(n_column):
+            re[j], im[j] = 0.0, 0.0
+        for row in range(from_re.size):
+            from_re[row], from_im[row] = enter_re[row, i], enter_im[row, i]
+        add_rows_twice(columns, from_re, from_im, re, im)
+        for j in range(n_column):
+            a, b = re[j], im[j]
+            re[j] = cosine * a - sine * b
+            im[j] = -(cosine * b + sine * a)  # its negative: the real part of a product is a sum
+    n = columns.shape[0] // 2
+    for row in range(n):  # displacement and velocity of a degree
+        first, second = columns[row], columns[n + row]
+        for j in range(n_column):
+            first[j], second[j] = 0.0, 0.0
+        for part in range(2):
+            shape, z = (shape_re, z_re) if part == 0 else (shape_im, z_im)
+            add_rows_twice(z, shape[row, :n_moving], shape[n + row, :n_moving], first, second)
+
+
+@jit_apart_sum
+def add_rows_twice(rows: Floats, a: Floats, b: Floats, first: Floats, second: Floats) -> None:
+    """Add rows (k or more, m), times values (k,), to two targets (m,) of their own: four rows at a time."""
+    n_whole = a.size - a.size % 4
+    for row in range(0, n_whole, 4):
+        w, x, y, z = rows[row], rows[row + 1], rows[row + 2], rows[row + 3]
+        a_w, a_x, a_y, a_z = a[row], a[row + 1], a[row + 2], a[row + 3]
+        b_w, b_x, b_y, b_z = b[row], b[row + 1], b[row + 2], b[row + 3]
+        for j in range(first.size):
+            first[j] += a_w * w[j] + a_x * x[j] + a_y * y[j] + a_z * z[j]
+            second[j] += b_w * w[j] + b_x * x[j] + b_y * y[j] + b_z * z[j]
+    for row in range(n_whole, a.size):
+        last, a_w, b_w = rows[row], a[row], b[row]
+        for j in range(first.size):
+            first[j] += a_w * last[j]
+            second[j] += b_w * last[j]
+
+
+@jit_lean_sum
+def saltate(
+    reduced: Reduced,
+    has_states: bool,
+    states: Ints,
+    motions: Floats,
+    rates: Floats,
+    given: Floats,
+    rate_begun: Floats,
+    room: ChangeRoom,
+    columns: Floats,
+) -> None:
+    """Apply the saltation matrix of the event that ends a piece to changes (2 n, k).
+
+    Parameters
+    ----------
+    states, motions, rates, given
+        Of the piece, as `revolutions.PieceRows` has them.
+    rate_begun : (2 n,)
+        Rate of the motion after the event.
+    """
+    n, row, jump = reduced.damping.shape[0], room.row, room.jump
+    rate = rates[lowest_bit(states[1])]
+    for j in range(row.size):
+        row[j] = 0.0
+    add_rows(columns, motions[GRADIENT], row)
+    for i in range(jump.size):
+        jump[i] = motions[RATE_ENDED, i]
+    n_impulse = 0
+    if states[2] != 0:
+        n_impulse = impulses_of(reduced, has_states, given, motions[AFTER, n:], room)
+    for i in range(n_impulse):
+        gain, direction, impulse = gain_of(room, i), room.direction[i], room.impulse[i]
+        strength = product(gain, motions[RATE_ENDED, n:])
+        for k in range(n):
+            jump[n + k] -= direction[k] * strength
+        for j in range(row.size):
+            impulse[j] = 0.0
+        add_rows(columns[n:], gain, impulse)
+    for i in range(n_impulse):
+        direction, impulse = room.direction[i], room.impulse[i]
+        for k in range(n):
+            along, target = direction[k], columns[n + k]
+            for j in range(row.size):
+                target[j] -= along * impulse[j]
+    for i in range(jump.size):
+        change, target = (rate_begun[i] - jump[i]) / rate, columns[i]
+        for j in range(row.size):
+            target[j] += change * row[j]
+
+
+@jit_inline_sum
+def gain_of(room: ChangeRoom, i: int) -> Floats:
+    """Impulse i, by the velocities before it, (n,)."""
+    return room.rows[i, room.rows.shape[0] :]
+
+
+@jit_lean_sum
+def impulses_of(reduced: Reduced, has_states: bool, given: Floats, velocity: Floats, room: ChangeRoom) -> int:
+    """Fill in what an impact makes of velocities: `dv+ = dv- - F (R F)^-1 R dv-`; returns the rows of R.
+
+    The rows R are those of the gap velocities that impulses change, each times 1 + restitution where the pair
+    parts, and of the slips that they stop; F (`room.direction`) are the directions of these impulses,
+    friction in proportion included, and `gain_of` has the rows of `(R F)^-1 R`. `given` are its impulses and
+    tractions (2, q), `velocity` (n,) what it leaves.
+    """
+    q, n = reduced.gap_jacobian.shape
+    largest = 0.0
+    for i in range(q):
+        largest = max(largest, abs(given[0, i]))
+    if largest == 0.0:
+        return 0
+    n_row, direction, rows = 0, room.direction, room.rows
+    for i in range(q):
+        if not given[0, i] > NO_IMPULSE * largest:
+            continue
+        parts = abs(product(reduced.gap_jacobian[i], velocity)) > AT_REST
+        room.scale[n_row] = 1.0 + reduced.restitution if parts else 1.0
+        share, stops = 0.0, False
+        if has_states:
+            slip = reduced.rim_speed[i] + product(reduced.slip[i], velocity)
+            stops = abs(slip) <= STOPPED * reduced.rim_speed[i]
+            share = 0.0 if stops else given[1, i] / given[0, i]
+        for k in range(n):
+            rows[n_row, 2 * q + k] = reduced.gap_jacobian[i, k]
+            if has_states:
+                direction[n_row, k] = reduced.gap_jacobian[i, k] - share * reduced.slip[i, k]
+            else:
+                direction[n_row, k] = reduced.force_direction[i, k]
+        n_row += 1
+        if stops:
+            room.scale[n_row] = 1.0
+            for k in range(n):
+                rows[n_row, 2 * q + k] = direction[n_row, k] = -reduced.slip[i, k]
+            n_row += 1
+    for i in range(n_row):
+        for j in range(n_row):
+            rows[i, j] = product(rows[i, 2 * q :], direction[j])
+        for j in range(n_row, 2 * q):
+            rows[i, j] = 0.0
+        for k in range(n):
+            rows[i, 2 * q + k] *= room.scale[i]
+    eliminate(rows, n_row)
+    return n_row
