@@ -1,4 +1,4 @@
-"""Tables of transitions between contact modes under set-valued friction, of those that a case takes often."""
+"""Tables of frequent transitions between contact modes under set-valued friction."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
     Ints = NDArray[np.int64]
 
 MOST_BYTES = 2**26  # of the transitions of a case
-MOST_SHARED = 2**27  # of a room of transitions, beyond which cases begin another
-UNMOVED = 1e-9  # of unit coordinates: what a transition moves less stays where it is
+MOST_SHARED = 2**27  # of a room of transitions, above which cases begin another one
+UNMOVED = 1e-9  # of unit coordinates: smaller changes by a transition count as none
 
 
 class Part(NamedTuple):
-    """Numbers of a contact mode or of a transition, as `kernels.transitions` reads them."""
+    """Numbers of a contact mode or of a transition for `kernels.transitions`."""
 
     number: Ints
     value: Floats
@@ -36,9 +36,9 @@ class Part(NamedTuple):
 
 
 class TransitionRoom:
-    """What the cases of a library have tabulated, one after the other in two arrays that grow.
+    """Transitions tabulated by the cases of a library, stacked in two arrays that grow.
 
-    Each part is written once, and its place stays: a case that has taken it reads it in later arrays, too.
+    Each part is written once at a fixed place: a case that uses it finds it in later arrays too.
     """
 
     def __init__(self) -> None:
@@ -51,11 +51,11 @@ class TransitionRoom:
 
     @property
     def is_full(self) -> bool:
-        """Whether further cases are to begin in a room of their own."""
+        """Whether further cases must begin their own room."""
         return self._n_value * self.value.itemsize > MOST_SHARED
 
     def take(self, key: tuple[int, int, str], make: Callable[[], Part]) -> tuple[int, int, int]:
-        """Places in `number` and `value` of what belongs to a key, and its bytes; it is made if need be."""
+        """Places in `number` and `value` of the part of a key, and its bytes; it is made if it is missing."""
         if key not in self._places:
             part = make()
             at_number, at_value = self._n_number, self._n_value
@@ -70,10 +70,10 @@ class TransitionRoom:
 
 
 class MetTransitions:
-    """Transitions that one case takes, tabulated where it takes them often.
+    """Transitions of one case, tabulated where they are frequent.
 
-    What the kernel does must not depend on what other cases have left: a case begins with no table, and takes
-    one out of the `room` that it shares with them where another has made it.
+    The kernel must not depend on other cases: a case begins without tables, and uses one from the shared
+    `room` only where it would have made it itself.
     """
 
     def __init__(self, room: TransitionRoom) -> None:
@@ -87,7 +87,7 @@ class MetTransitions:
         self._placed: Transitions | None = None
 
     def among(self, tables: ModeTables) -> Transitions:
-        """Return them as a kernel takes them, for the modes of these tables."""
+        """Return them for a kernel, for the modes of these tables."""
         self._note_passages()
         self._masks = tables.mask.tolist()
         place = {mask: k for k, mask in enumerate(self._masks) if mask >= 0}
@@ -105,9 +105,9 @@ class MetTransitions:
         return self._placed
 
     def is_due(self, before: int, after: int, *, is_counted: bool) -> bool:
-        """Whether the transition between two sets of states has just been passed often enough for a table.
+        """Whether the transition between two sets of states is now frequent enough for a table.
 
-        `is_counted` says whether the kernel has counted this passage, as it does where its tables hold both.
+        `is_counted`: the kernel has counted this passage, as it does where its tables contain both modes.
         """
         self._note_passages()
         passed = self._entry.get((before, after), UNKNOWN)
@@ -131,21 +131,21 @@ class MetTransitions:
         self._entry[masks], _ = self._take((*masks, "transition"), partial(transition, before, after))
 
     def _note_passages(self) -> None:
-        """Take over how often the kernel has passed; it has to be given them anew then."""
+        """Take over the kernel's counts of passages; they must be passed to it again afterwards."""
         if self._placed is not None:
             entry, self._placed = self._placed.entry, None
             for before, after in np.argwhere(entry != UNKNOWN).tolist():
                 self._entry[self._masks[before], self._masks[after]] = int(entry[before, after])
 
     def _take(self, key: tuple[int, int, str], make: Callable[[], Part]) -> tuple[int, int]:
-        """Places in `number` and `value` of what belongs to a key."""
+        """Places in `number` and `value` of the part of a key."""
         at_number, at_value, n_byte = self._room.take(key, make)
         self._n_byte += n_byte
         return at_number, at_value
 
 
 def _with_room(array: NDArray[Any], n_filled: int, n_more: int) -> NDArray[Any]:
-    """The array, or a longer one that begins with what it is filled with."""
+    """The array, or a longer one with the same content."""
     if n_filled + n_more <= array.size:
         return array
     longer = room_for((2 * (n_filled + n_more),), array.dtype)
@@ -154,7 +154,7 @@ def _with_room(array: NDArray[Any], n_filled: int, n_more: int) -> NDArray[Any]:
 
 
 def seen_in(tables: ModeTables, reduced: Reduced, bodies: FrictionBodies) -> Part:
-    """What an event sees of the q pairs in a mode, what impulses give to its coordinates, and its reach.
+    """Readings of the q pairs in a mode for events, effects of impulses on its coordinates, and its reach.
 
     They are (4 q, 2, m), (2 q, 2, m) and (m,), one after the other; the reach is the largest motion along
     `reduced.translations` with each coordinate.

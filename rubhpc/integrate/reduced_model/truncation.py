@@ -1,4 +1,4 @@
-"""Choice of the modes that a reduced model keeps, and an estimate of the error by those left out."""
+"""Choice of the modes that a reduced model keeps, and estimate of the error by the omitted ones."""
 
 from __future__ import annotations
 
@@ -29,26 +29,26 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Bools = NDArray[np.bool_]
 
-MARGIN = 5.0  # estimates without it were up to 5.5 times too small: a case has many contacts, not one
-REBOUNDS = 3.0  # where modes are added, how much closer: a body that rebounds many times multiplies an error
+MARGIN = 5.0  # estimates without it were up to 5.5 times too small: a case has many contacts
+REBOUNDS = 3.0  # stricter limit where modes are added: repeated rebounds multiply an error
 FINER = 0.5  # share of the accuracy under all laws but steady sliding along a fixed normal
-TURNED = 0.3  # share of motion along the rim that opens a curved gap: its normal turned, its stator bent
-COMPACT = 1e-6  # by how much more a body's static inertia is than its tip's mass, up to which it is a mass
-MOST_MODES = 400  # kept for the sake of the estimate; `cutoff_frequency` may ask for more
+TURNED = 0.3  # share of motion along the rim that opens a curved gap, by a turned normal or a bent stator
+COMPACT = 1e-6  # relative excess of a body's static inertia over its tip's mass; less: a rigid mass
+MOST_MODES = 400  # kept because of the estimate; `cutoff_frequency` may require more
 
 
 class Touch(NamedTuple):
-    """What contacts feel; rigid ones that slide steadily along a fixed normal, no motion along the rim."""
+    """Sensitivity of contacts to motion. Rigid contacts in steady sliding ignore motion along the rim."""
 
     may_stick: bool = False  # friction is set-valued
-    is_curved: bool = False  # gaps are: an updated normal, or a bent stator
+    is_curved: bool = False  # curved gaps: updated normal or bent stator
     spring: float = 0.0  # of a penalty, N/m; 0 where contacts are rigid
-    damper: float = 0.0  # beside it, N s/m
+    damper: float = 0.0  # of a penalty, N s/m
     bounces: bool = False  # impacts have restitution
 
     @property
     def share(self) -> float:
-        """Of the accuracy asked for, which decides on modes; a penalty's contacts excite less of them."""
+        """Share of the requested accuracy for the choice of modes; contacts with a penalty excite fewer."""
         has_jumps = self.spring == 0.0 and (self.may_stick or self.bounces)
         return FINER if self.is_curved or has_jumps else 1.0
 
@@ -57,26 +57,27 @@ SMOOTH = Touch()
 
 
 def touch_of(model: Model, law: Law, *, is_updated: bool) -> Touch:
-    """What contacts feel under a law, with the updated normal or the fixed one."""
+    """Sensitivity of contacts under a law, with the updated or the fixed normal."""
     is_bent = any(stator.squared_slope is not None for stator in model.stators)
     curved, bounces = is_updated or is_bent, law.restitution > 0.0
     return Touch(plain(is_set_valued)(law), curved, law.stiffness, law.damping, bounces)
 
 
 class Ringing(NamedTuple):
-    """How strongly the n modes ring after a contact, in r signals and gaps."""
+    """Amplitudes of the n modes after a contact, in r signals and gaps."""
 
-    share: Floats  # (r, n), square of each mode's ring, less what its decay takes, over the sum for all modes
-    impact: float  # share of the closing momentum that the heaviest tip's own mass takes up at once
+    share: Floats  # (r, n), square of each mode's amplitude, reduced by its decay, over the sum of all modes
+    impact: float  # largest share of the closing momentum that a tip's own mass absorbs immediately
 
 
 def kept_modes(model: Model, spin: float, accuracy: float, touch: Touch = SMOOTH) -> list[Bools]:
-    """Which modes of each part are kept: those up to `cutoff_frequency`, and those that ring too much.
+    """Kept modes of each part: those up to `cutoff_frequency`, and those with too large amplitudes.
 
-    Where the estimated error (`modal_error`) without the modes above is beyond the accuracy, those with the
+    Where the estimated error (`modal_error`) without the modes above exceeds the accuracy, those with the
     largest share in any signal or force are kept too, until it is within a third of the accuracy. All modes
-    are kept where a tip's own mass takes up more than the accuracy of the closing momentum (`struck_share`):
-    its impacts excite modes of any frequency. At most MOST_MODES are kept for these reasons.
+    are kept where a tip's own mass absorbs a share of the closing momentum above the accuracy
+    (`struck_share`): its impacts excite modes of any frequency. At most MOST_MODES are kept for these
+    reasons.
     """
     parts, accuracy = at_standstill(model).parts, touch.share * accuracy
     cutoff = cutoff_frequency(model, spin, accuracy)
@@ -98,31 +99,31 @@ def kept_modes(model: Model, spin: float, accuracy: float, touch: Touch = SMOOTH
 
 
 def modal_error(model: Model, spin: float, are_kept: list[Bools], touch: Touch = SMOOTH) -> float:
-    """Estimate the largest error of a signal or a force, as a share of it, by the modes left out.
+    """Estimate the largest relative error of a signal or a force by the omitted modes.
 
-    A contact force is taken for a pulse at the contact frequency `w_c` (`standstill.Standstill`), with the
-    spectrum `G(w) = min(1, (w_c / w)^2 + b w_c / w + s)`. At touch the tip's own mass gives up the share s
-    of the closing momentum at once, and the force rises to that of a wave in the stator, b of its later peak.
-    Under a penalty that mass bounces: where s rings more, as `bounce_spectrum` has it, modes left out do too.
-    A mode of frequency w whose place of contact moves by b, and whose place of a signal by a, rings with the
-    displacement `a b G(w) / w` there, and opens and closes the gap with the velocity `b^2 G(w)`; friction, as
+    A contact force is modelled as a pulse at the contact frequency `w_c` (`standstill.Standstill`), with the
+    spectrum `G(w) = min(1, (w_c / w)^2 + b w_c / w + s)`. At touch the tip's own mass transfers the share s
+    of the closing momentum immediately, and the force rises to that of a wave in the stator, b of its later
+    peak. Under a penalty that mass bounces: where this amplifies s (`bounce_spectrum`), it amplifies omitted
+    modes too. A mode of frequency w with the amplitude b at the contact and a at a signal rings there with
+    the displacement `a b G(w) / w`, and moves the gap with the velocity `b^2 G(w)`. Friction, assumed as
     large as the normal force, is a second force of that kind. Set-valued friction jumps where slip ends or
-    turns, with the spectrum of a step, `w_c / w` besides; it then holds the rim, and a mode that moves the
-    rim along by b starts slip with the velocity `b^2 G(w)`. Where gaps are curved, motion along the rim opens
-    and closes them too, by a share of it (TURNED).
+    reverses, which adds the spectrum of a step, `w_c / w`. It then constrains the rim, and a mode with the
+    amplitude b along the rim starts slip with the velocity `b^2 G(w)`. Where gaps are curved, a share
+    (TURNED) of the motion along the rim moves them too.
 
-    A ring counts as long as it lasts, over half a period of `w_c` at most: what is damped at once is followed
-    by the static shapes that stand for it. What it drives through dampers and gyroscopic terms rings with it
-    (`coupled_ringing`). The error is the root of the sum of squares over the modes left out, over that of all
-    modes, times a margin.
+    The ringing of a mode counts for its duration, at most half a period of `w_c`: strongly damped modes are
+    represented by static shapes. Modes that it drives through dampers and gyroscopic terms are included
+    (`coupled_ringing`). The error is the root of the sum of squares over the omitted modes, relative to that
+    of all modes, times a margin.
 
     Parameters
     ----------
     spin : float, rad/s
     are_kept : list of (n,) bool
-        Of each part, the modes kept.
+        Kept modes of each part.
     touch : Touch
-        What contacts feel of motion along the rim.
+        Sensitivity of contacts to motion along the rim.
 
     Returns
     -------
@@ -136,7 +137,7 @@ def modal_error(model: Model, spin: float, are_kept: list[Bools], touch: Touch =
 
 
 def sufficient_accuracy(model: Model, spin: float) -> float:
-    """Accuracy, a power of ten, that puts `cutoff_frequency` above all modes, whatever their number."""
+    """Accuracy, a power of ten, with a `cutoff_frequency` above all modes."""
     highest = max(float(part.frequency[-1]) for part in at_standstill(model).parts)
     accuracy = 1e-3
     while cutoff_frequency(model, spin, accuracy) < highest:
@@ -146,7 +147,7 @@ def sufficient_accuracy(model: Model, spin: float) -> float:
 
 @lru_cache(maxsize=4)
 def ringing_of(model: Model, spin: float, touch: Touch) -> Ringing:
-    """How strongly the modes of a model ring after contacts of any stator."""
+    """Amplitudes of the modes of a model after contacts of any stator."""
     standstill = at_standstill(model)
     frequency = np.concatenate([part.frequency for part in standstill.parts])
     mode = np.hstack([part.mode for part in standstill.parts])
@@ -157,7 +158,7 @@ def ringing_of(model: Model, spin: float, touch: Touch) -> Ringing:
     twist_row = output_degrees(model)[TWIST]
     turned = mode[twist_row] if twist_row >= 0 else np.zeros(frequency.size)
     displaced, moving, accelerated = model.probe_rows @ mode
-    lively = np.vstack(  # the torsional acceleration, and probes: what each sees of a unit of the mode
+    lively = np.vstack(  # torsional acceleration and probes: reading of each for a unit of the mode
         [turned * frequency**2, np.hypot(displaced - accelerated * frequency**2, moving * frequency)]
     )
     rungs: list[Floats] = []
@@ -177,7 +178,7 @@ def ringing_of(model: Model, spin: float, touch: Touch) -> Ringing:
         along = lateral + ez * v - ey * w - stator.radius * twist
         still = np.zeros(frequency.size)
         moved = across**2 + axial**2
-        by_normal, by_friction = [moved * pulse], [still]  # how far gaps and slip ring
+        by_normal, by_friction = [moved * pulse], [still]  # amplitudes in gaps and slip
         if touch.is_curved:
             by_normal.append((moved + (TURNED * along) ** 2) * pulse)
             by_friction.append(still)
@@ -192,7 +193,7 @@ def ringing_of(model: Model, spin: float, touch: Touch) -> Ringing:
     share, lively_share = (
         shares(np.vstack(those), len(model.stators), coupled, lasting * raised) for those in (rungs, probed)
     )
-    # An event that is late by a share of the contact's time shifts what rings faster by more of its own.
+    # An event that is late by a share of the contact's duration shifts the phase of fast modes more.
     ratio = frequency / standstill.contact_frequency
     is_fast = ratio > CUTOFF_RATIO
     late = float((lively_share[:, is_fast] @ ratio[is_fast] ** 2).max(initial=1.0))
@@ -200,16 +201,16 @@ def ringing_of(model: Model, spin: float, touch: Touch) -> Ringing:
 
 
 def shares(rung: Floats, n_stator: int, coupled: Floats, lasting: Floats) -> Floats:
-    """Square of each mode's ring over the sum for all modes, of each signal and stator, (r, n).
+    """Square of each mode's amplitude over the sum of all modes, of each signal and stator, (r, n).
 
     Parameters
     ----------
     rung : (n_stator * 2 * r, n)
         By the normal force of each stator, then by its friction.
     coupled : (n, n)
-        Square of how far the ring of a mode moves others.
+        Squared amplitudes of other modes driven by a mode.
     lasting : (n,)
-        What decay leaves of each ring, and how much stronger it may be than thought of in the sum.
+        Factor of each mode by its decay, and by a possible amplification that the sum omits.
     """
     n = lasting.size
     square = rung**2
@@ -222,11 +223,12 @@ def shares(rung: Floats, n_stator: int, coupled: Floats, lasting: Floats) -> Flo
 
 
 def coupled_ringing(damping: Floats, frequency: Floats) -> Floats:
-    """How far a ring of each mode (row) moves the other modes (column), (n, n), relative to itself.
+    """Amplitudes of the other modes (column) driven by each mode (row), (n, n), relative to it.
 
-    A mode of frequency w that moves at v forces another, of frequency w', by `-c v`, where c is their entry
-    of `damping` (n, n), 1/s. The other moves by `c w / |w'^2 - w^2|` of it, and in resonance as far. Above
-    all these are modes of the two planes, which gyroscopic terms couple.
+    A mode of frequency w with the velocity v acts on another one, of frequency w', with the force `-c v`,
+    where c is their entry of `damping` (n, n), 1/s. The relative amplitude of the other is
+    `c w / |w'^2 - w^2|`, and 1 in resonance. This concerns mainly modes of the two planes, which gyroscopic
+    terms couple.
     """
     driven = np.abs(damping.T) * frequency[:, np.newaxis]
     apart = np.abs(frequency[:, np.newaxis] ** 2 - frequency**2)
@@ -237,7 +239,7 @@ def coupled_ringing(damping: Floats, frequency: Floats) -> Floats:
 def bounce_spectrum(
     across: Floats, axial: Floats, frequency: Floats, decay: Floats, contact_frequency: float, touch: Touch
 ) -> Floats:
-    """Spectrum (n,) of what the tip's own mass gives up, relative to an impact; 1 where contacts are rigid.
+    """Spectrum (n,) of the momentum of the tip's own mass, relative to an impact; 1 for rigid contacts.
 
     On a spring k and damper c of a penalty, with 1/m the motion of rotor and tip for a unit of momentum, it
     rings as `(k + i c w) / (k - m w^2 + i c w)`, as long as a contact and the `decay` (n,), 1/s, of the modes
