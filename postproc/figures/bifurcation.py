@@ -36,7 +36,8 @@ _WIDTH = 180  # mm: two columns, since an axis has hundreds of values
 _MOST_DRAWN = 200_000  # points in a pdf or svg; of more, they become a picture in it
 _SIZES = 0.6, 3.5  # of the points, pt
 _LEAST_RANGE = 0.02  # of the largest value: points of one motion differ by rounding over all cases
-_UNDER = "0.6", "0.35"  # simulated points under branches: greys of up, or both, and of down
+_UNDER = ("0.66", 0.6), ("0.1", 1.0)  # simulated points under branches, of up (or both) and down: grey, size
+_LEAST_UNDER = 1.4  # pt: a smaller mark of a sweep does not show beside the line
 _WAYS = (("^", "#E69F00", 2.4), ("v", "#0072B2", 1.2))  # up and down: marker, colour, size
 _IN_A_ROW = 6  # names in the legend
 
@@ -130,10 +131,10 @@ def draw_simulated(data: xr.Dataset, signal: str, ax: Axes) -> Axes:
     """Draw the points of `sections_along` in grey, under branches; by their markers where swept both ways."""
     has_ways = DIRECTION in data.dims
     draw_bifurcation(data, signal, ax, DIRECTION if has_ways else None, has_legend=False)
-    for line, shade in zip(ax.lines, _UNDER, strict=False):
+    for line, (shade, share) in zip(ax.lines, _UNDER, strict=False):
         line.set(color=shade, zorder=1)
         if has_ways:
-            line.set_markersize(max(1.2, 0.6 * line.get_markersize()))
+            line.set_markersize(max(_LEAST_UNDER, share * line.get_markersize()))
     return ax
 
 

@@ -9,7 +9,7 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
 from postproc.catalogue import figures
-from postproc.figures.bifurcation import default_axis, draw_bifurcation
+from postproc.figures.bifurcation import default_axis, draw_bifurcation, draw_simulated
 from postproc.figures.palette import REGIME_COLORS
 from postproc.signals.sections import sections_along
 from postproc.store.open import open_store
@@ -111,6 +111,17 @@ def test_of_a_sweep_both_ways_those_of_each_are_hatched(synthetic_path, ax):
     data["status"][1, -1] = DIVERGED
     draw_bifurcation(data, "vertical", ax, "direction")
     assert list(hatched(ax)) == ["diverged, down"]
+
+
+def test_under_branches_the_marks_of_both_sweeps_stand_out(synthetic_path, ax):
+    """A falling sweep lies on the line of its branch: its marks are wider than the line, and dark."""
+    data = sections_along(select(open_store(synthetic_path), CHOICE), "vertical", "speed_ratio").load()
+    flags = xr.DataArray([0, 1], dims="direction", attrs={"flag_meanings": "up down"})
+    draw_simulated(data.expand_dims(direction=[0, 1]).assign_coords(direction=flags), "vertical", ax)
+    up, down = ax.lines
+    assert (up.get_marker(), down.get_marker()) == ("^", "v")
+    assert up.get_markersize() > down.get_markersize() > 3.0  # pt; lines of branches are 1.2 wide
+    assert to_rgba(up.get_color())[0] - to_rgba(down.get_color())[0] > 0.5  # greys
 
 
 def test_points_are_read_lazily(synthetic_path):
