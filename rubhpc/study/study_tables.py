@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rubhpc.errors import InputError
-from rubhpc.input.messages import brief, place
+from rubhpc.input.messages import brief, nearest, place
 from rubhpc.input.quantity import parse_quantity
 from rubhpc.input.reading import build
 from rubhpc.rig.reading import with_keys
@@ -58,9 +58,11 @@ def read_branch(
 ) -> BranchKeys:
     """Return the table [branch], its step in the unit of its axis."""
     along, step = table.get("along"), table.get("step")
-    if isinstance(along, str) and along not in dict(flatten(grid)):
-        fix = f"{along} is not an axis of the grid; add it as {{ start, stop }}"
-        raise InputError(f"{place(file, 'branch', 'along')}: {fix}")
+    axes = dict(flatten(grid))
+    if isinstance(along, str) and along not in axes:
+        meant = nearest(along, axes)
+        fix = meant if meant.startswith("did") else "add it as { start, stop }"
+        raise InputError(f"{place(file, 'branch', 'along')}: {along} is not an axis of the grid; {fix}")
     if sample is not None:
         fix = "a sample has no axis to follow; remove [sample] or [branch]"
         raise InputError(f"{place(file, 'branch')}: {fix}")

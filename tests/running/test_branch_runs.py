@@ -156,6 +156,7 @@ def test_multipliers_are_drawn(store):
     [
         ('{ start = "112 um", stop = "124 um" }', '"112 um"', "clearance: .* follows it; write it as"),
         ('along = "clearance"', 'along = "speed"', "along: speed is not an axis of the grid"),
+        ('along = "clearance"', 'along = "clearence"', r"axis of the grid; did you mean clearance\?"),
         ("periods = [1, 2]", "periods = [1.5]", "periods: 1.5 is not a number of revolutions"),
         ("periods = [1, 2]", "periods = []", "periods: "),
         ('step = "4 um"', 'step = "4 kg"', "step: "),
