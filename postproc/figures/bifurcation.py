@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from postproc.figures.branch_lines import draw_branches
+from postproc.figures.branch_lines import draw_branches, name_branches
 from postproc.figures.cells import cell_edges, hatch_cells, is_geometric
 from postproc.figures.drawing import Drawing
 from postproc.figures.palette import NOT_DONE, categories
@@ -120,9 +120,7 @@ def _of_branches(cases: xr.Dataset, signal: str, over: str | None) -> Drawing:
             xlabel=displayed(cases[along])[1],
             ylabel=scale.label(f"{short_name(cases[f'section_{signal}'])},\nonce a revolution"),
         )
-        ax.figure.legend(
-            loc="outside upper right", ncols=9, handlelength=1.2, handletextpad=0.3, columnspacing=0.5
-        )
+        name_branches(axes)
 
     return Drawing(shown=cases, draw=draw, height=90, width=_WIDTH, lines=tuple(notes))
 

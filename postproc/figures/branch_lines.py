@@ -14,7 +14,7 @@ from rubhpc.errors import InputError
 from rubhpc.schema import BRANCH_EVENT
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     import xarray as xr
     from matplotlib.axes import Axes
@@ -28,6 +28,7 @@ MARKED: dict[str, tuple[str, str, float]] = {  # event: name, marker, size
     "grazing": ("grazing", "^", 4.4),
     "branch_point": ("branch point", "P", 4.6),
 }
+_IN_A_ROW = 6  # names in the legend
 _STYLES: dict[bool, dict[str, Any]] = {
     True: {"linestyle": "-", "linewidth": 1.2},
     False: {"linestyle": "--", "linewidth": 0.9},
@@ -85,6 +86,18 @@ def mark_events(data: xr.Dataset, x: NDArray[Any], y: NDArray[Any], ax: Axes) ->
             zorder=4,
         )
     return drawn
+
+
+def name_branches(axes: Sequence[Axes]) -> None:
+    """Add the legend of branches to a figure, in two rows where one would reach its caption."""
+    n_name = sum(len(ax.get_legend_handles_labels()[1]) for ax in axes)
+    axes[0].figure.legend(
+        loc="outside upper right",
+        ncols=n_name if n_name <= _IN_A_ROW else -(-n_name // 2),
+        handlelength=1.2,
+        handletextpad=0.3,
+        columnspacing=0.8,
+    )
 
 
 def events_at(points: xr.Dataset, shown: xr.Dataset, x: str, y: str) -> xr.Dataset:

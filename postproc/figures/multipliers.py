@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from postproc.figures.branch_lines import draw_lines, mark_events
+from postproc.figures.branch_lines import draw_lines, mark_events, name_branches
 from postproc.figures.drawing import Drawing
 from postproc.figures.palette import categories
 from postproc.store.axes import source
@@ -51,7 +51,7 @@ def multipliers(cases: xr.Dataset, *, branch: Count | None = None) -> Drawing:
     def draw(axes: list[Axes]) -> None:
         draw_plane(shown, axes[0])
         draw_moduli(shown, along, axes[1])
-        axes[0].figure.legend(loc="outside upper right", ncols=9, handletextpad=0.4, columnspacing=1.0)
+        name_branches(axes)
 
     return Drawing(
         shown=shown, draw=draw, panels=(1, 2), is_shared=False, height=80, width=180, lines=tuple(notes)
