@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba.core import types
+from numba.core import ir, types
 from numba.core.cgutils import gep_inbounds
+from numba.core.cgutils import ir as llvm  # type: ignore[attr-defined]  # a package of its own
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.compiler import Flags as NumbaFlags
@@ -43,6 +44,20 @@ class Flags(NumbaFlags):
 
 _HASH = hash(NumbaFlags())  # of the option names, as in numba
 _NAMED = (types.NamedTuple, types.NamedUniTuple)
+_SHORT: dict[str, list[tuple[int, int]]] = {}  # first and last lines of functions, by their file
+
+
+def note_short_loops(function: Any) -> None:
+    """Compile the loops of a function for a few whole vectors each, wherever it is inlined.
+
+    Otherwise LLVM takes up to four vectors of eight numbers at a time, and the last 8 of 72 one by one.
+    """
+    lines = [line for _, _, line in function.__code__.co_lines() if line is not None]
+    _SHORT.setdefault(function.__code__.co_filename, []).append((min(lines), max(lines)))
+
+
+def _is_short(loc: ir.Loc) -> bool:
+    return any(first <= loc.line <= last for first, last in _SHORT.get(loc.filename, ()))
 
 
 class _FieldLower(Lower):
@@ -62,6 +77,21 @@ class _FieldLower(Lower):
                 self.incref(held[place], field)
                 return self.context.cast(self.builder, field, held[place], resty)
         return super().lower_expr(resty, expr)
+
+    def lower_inst(self, inst: ir.Stmt) -> None:
+        super().lower_inst(inst)
+        if isinstance(inst, ir.Jump) and self.blkmap[inst.target].is_terminated and _is_short(inst.loc):
+            self.builder.block.terminator.set_metadata("llvm.loop", self._one_vector_at_a_time())
+
+    def _one_vector_at_a_time(self) -> llvm.MDValue:
+        """Metadata of a loop that is not to be interleaved: a node whose first operand is the node itself."""
+        module = self.builder.module
+        count = module.add_metadata(
+            [llvm.MetaDataString(module, "llvm.loop.interleave.count"), llvm.Constant(llvm.IntType(32), 1)]
+        )
+        loop = llvm.MDValue(module, [count], name=str(len(module.metadata)))
+        loop.operands = loop, count
+        return loop
 
     def storevar(self, value: Any, name: str, argidx: int | None = None) -> None:
         if self.context.enable_nrt or self._disable_sroa_like_opt:

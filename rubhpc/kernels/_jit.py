@@ -18,7 +18,14 @@ from typing import Any, TypeVar
 import numba
 from numba.core.compiler_lock import global_compiler_lock
 
-from rubhpc.kernels._compiler import ApartCompiler, Flags, KernelCompiler, LinkedCompiler, PartCompiler
+from rubhpc.kernels._compiler import (
+    ApartCompiler,
+    Flags,
+    KernelCompiler,
+    LinkedCompiler,
+    PartCompiler,
+    note_short_loops,
+)
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -221,6 +228,15 @@ def plain(kernel: F) -> F:
     Only for comparisons and look-ups: compiled code may give other last bits of products and sums.
     """
     function: F = getattr(kernel, "py_func", kernel)
+    return function
+
+
+def short_loops(function: F) -> F:
+    """Mark a function, in the line below its compilation, whose loops take a few vectors of eight each.
+
+    They are then not interleaved, which changes the order of their sums.
+    """
+    note_short_loops(function)
     return function
 
 

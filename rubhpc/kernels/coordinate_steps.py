@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_apart_sum, jit_inline_sum
+from rubhpc.kernels._jit import jit_apart_sum, jit_inline_sum, short_loops
 
 Floats = NDArray[np.float64]
 
@@ -20,6 +20,7 @@ def lowest_level(count: int) -> int:
 
 
 @jit_apart_sum
+@short_loops
 def go_on(
     count: int, power_re: Floats, power_im: Floats, z_re: Floats, z_im: Floats, re: Floats, im: Floats
 ) -> None:
@@ -49,6 +50,7 @@ def go_on(
 
 
 @jit_apart_sum
+@short_loops
 def turn_on(count: int, power_re: Floats, power_im: Floats, z_re: Floats, z_im: Floats) -> None:
     """Advance modal coordinates (m,) by `count` ticks in place, as `go_on`."""
     level, rest = 0, count

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum
+from rubhpc.kernels._jit import jit_inline_sum, short_loops
 from rubhpc.kernels.contact_modes import positive_interval
 from rubhpc.kernels.friction_states import OPEN, state_of
 
@@ -17,6 +17,7 @@ FREE, SURE = range(2)  # rows of what is known of the switch functions
 
 
 @jit_inline_sum
+@short_loops
 def free_until(
     states: int,
     mode: int,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum
+from rubhpc.kernels._jit import jit_inline_sum, short_loops
 from rubhpc.kernels.contact_modes import ModeTables, dot, floor_log2
 from rubhpc.kernels.coordinate_steps import go_on
 from rubhpc.kernels.event_bounds import FREE
@@ -108,6 +108,7 @@ def move_stuck(states: int, n_eigenmode: int, rim_speed: Floats, time: float, z_
 
 
 @jit_inline_sum
+@short_loops
 def root_ahead(
     tables: ModeTables, mode: int, crossing: int, tick: float, z_re: Floats, z_im: Floats
 ) -> float:
@@ -170,6 +171,7 @@ def root_between(
 
 
 @jit_inline_sum
+@short_loops
 def approach_change(
     tables: ModeTables,
     bodies: FrictionBodies,

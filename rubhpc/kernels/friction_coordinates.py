@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum, short_loops
 from rubhpc.kernels.accumulators import DAMPING_LOSS, UNBALANCE_WORK, Accumulator
 from rubhpc.kernels.case_progress import NONE, Clock, Progress, shaft_turn
 from rubhpc.kernels.contact_modes import ModeTables, add_rows, dot, find_mode
@@ -32,6 +32,7 @@ def used_width(tables: ModeTables, mode: int) -> int:
 
 
 @jit_inline_sum
+@short_loops
 def enter_states(
     tables: ModeTables, clearance: Floats, clock: Clock, progress: Progress, motion: Floats, z: Floats
 ) -> bool:
@@ -83,6 +84,7 @@ def begin_states(
 
 
 @jit_inline_sum
+@short_loops
 def leave_states(tables: ModeTables, mode: int, z: Floats, motion: Floats) -> None:
     """Fill the reduced motion (2 n,) from the coordinates (2, m) of a contact mode."""
     used = used_width(tables, mode)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_apart_sum, jit_inline_sum, jit_lean, jit_lean_sum
+from rubhpc.kernels._jit import jit_apart_sum, jit_inline_sum, jit_lean, jit_lean_sum, short_loops
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -48,6 +48,7 @@ NO_TRANSITIONS = Transitions(np.zeros((0, 0), dtype=np.int64), _EMPTY, _EMPTY, _
 
 
 @jit_inline_sum
+@short_loops
 def is_far(transitions: Transitions, mode: int, q: int, m: int, limit: float, z: Floats) -> bool:
     """Whether coordinates (2, m) of a mode may take the rotor beyond the limit, m: by the sizes of all."""
     reach = transitions.value[transitions.mode[mode] + 2 * (SEEN + GIVEN) * q * m :]
@@ -58,6 +59,7 @@ def is_far(transitions: Transitions, mode: int, q: int, m: int, limit: float, z:
 
 
 @jit_inline_sum
+@short_loops
 def see(
     transitions: Transitions, mode: int, m: int, i: int, used: int, z: Floats
 ) -> tuple[float, float, float, float]:
@@ -77,6 +79,7 @@ def see(
 
 
 @jit_lean
+@short_loops
 def add_impulses(transitions: Transitions, mode: int, q: int, m: int, given: Floats, z: Floats) -> None:
     """Add impulses and tractions (2, q), N s, to the coordinates (2, m) of the mode that goes on."""
     place = transitions.mode[mode] + 2 * SEEN * q * m
@@ -91,6 +94,7 @@ def add_impulses(transitions: Transitions, mode: int, q: int, m: int, given: Flo
 
 
 @jit_lean
+@short_loops
 def pass_over(transitions: Transitions, place: int, m: int, z: Floats, after: Floats) -> None:
     """Fill the coordinates `after` (2, m) in the next mode, but for those that do not move, from `z`."""
     number, value, source, target = (
@@ -126,6 +130,7 @@ def pass_over(transitions: Transitions, place: int, m: int, z: Floats, after: Fl
 
 
 @jit_apart_sum
+@short_loops
 def times_rows(rows: Floats, n_row: int, width: int, value: Floats, total: Floats) -> None:
     """Fill `total` (width,) with rows (n_row width,) times values (n_row,): eight rows at a time."""
     whole, last = n_row - n_row % 8, total[:width]

@@ -2,17 +2,21 @@
 
 import fcntl
 import math
+import re
 import subprocess
 import sys
 import threading
 from itertools import product
 
+import numba
+import numpy as np
 import pytest
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Flags
 from running import ROOT, environment
 
 from rubhpc.kernels import _jit
+from rubhpc.kernels._compiler import KernelCompiler
 
 CALLEE = """
 from probe._jit import {flavour}
@@ -192,3 +196,35 @@ def test_division_by_zero_yields_infinity():
     """As in NumPy: a kernel never raises."""
     assert quotient(1.0, 0.0) == math.inf
     assert math.isnan(quotient(0.0, 0.0))
+
+
+def add(a, b):
+    for k in range(a.size):
+        b[k] += a[k]
+
+
+def add_few(a, b):
+    for k in range(a.size):
+        b[k] += a[k]
+
+
+def call_add_few(a, b):
+    inlined(a, b)
+
+
+inlined = numba.njit(inline="always")(_jit.short_loops(add_few))
+
+
+def test_short_loops_take_one_vector_at_a_time():
+    """Wherever they are compiled into; what is left behind whole vectors is less."""
+
+    def vectors(function):
+        kernel = numba.njit(pipeline_class=KernelCompiler)(function)
+        a, b = np.arange(13.0), np.ones(13)
+        kernel(a, b)
+        assert b.tolist() == (a + 1.0).tolist()
+        (code,) = kernel.inspect_llvm().values()
+        return len(re.findall(r"load <\d+ x double>", code))
+
+    assert vectors(add_few) == vectors(call_add_few) == 2  # one of each array
+    assert vectors(add) > 2
