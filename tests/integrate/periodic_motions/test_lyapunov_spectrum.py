@@ -94,6 +94,40 @@ def test_impacts_alone_shrink_the_volume():
     assert total == pytest.approx(2 * math.log(RESTITUTION) * n_impact / 40, rel=1e-8)
 
 
+@pytest.mark.parametrize(
+    ("contact", "damping"),
+    [
+        ({"restitution": RESTITUTION}, 0.02),
+        ({"law": "penalty", "stiffness": 400.0, "damping": 0.0}, 0.0),
+        ({"law": "penalty", "stiffness": 400.0, "damping": 1.5}, 0.02),
+    ],
+    ids=["restitution", "penalty", "damped penalty"],
+)
+def test_sum_is_the_trace_of_the_flow_between_impacts_and_in_contact(contact, damping):
+    """Chaos: dampers act for as long as they are pressed, impacts take a share each, and events nothing."""
+    setup = prepare(
+        oscillator(damping), SPIN, contact=Contact(**contact), integrator=Integrator(step=1e-3),
+        samples_per_revolution=64,
+    )  # fmt: skip
+    begun = replace(State.at_rest(setup.model), rotor_velocity=np.array([0.3]))
+    motion = PiecewiseMotion(setup, 1e-12, 0.0, begun)
+    found = exponents(motion, 2, aligning=0, followed=100)
+    at, states, pressed, n_event, logarithm = motion.start, motion.states, 0.0, 0, 0.0
+    for _ in range(100):
+        revolution = motion.revolve(at, states)
+        at, states = revolution.end, revolution.states
+        n_event += sum(piece.crossing != 0 for piece in revolution.pieces)
+        pressed += sum(
+            piece.duration for piece in revolution.pieces if motion.mode(piece.states).is_closed[0]
+        )
+        if "restitution" in contact:
+            logarithm += 2 * math.log(RESTITUTION) * sum(piece.touching.size for piece in revolution.pieces)
+    assert n_event > 50
+    assert found[0] > 0.1
+    trace = damping * 100 * motion.turn + contact.get("damping", 0.0) * pressed
+    assert found.sum() == pytest.approx((logarithm - trace) / 100, rel=1e-7)
+
+
 def test_periodic_motion_has_the_logarithms_of_its_multipliers():
     """But for what the displacements still turn in 256 revolutions, each by a share of 1/256."""
     case = {"speed_ratio": 0.75, "clearance": "100 um", "keep": ()}
