@@ -73,9 +73,19 @@ class Judge:
 
     def serves(self, acceleration: float) -> bool:
         """Whether modes hold their accuracy all over the range."""
+        if 0.0 <= (acceleration - self._acceleration) / self.rise <= 1.0 and self._serves_all:
+            return True
         if acceleration not in self._known:
-            self._known[acceleration] = self.error(acceleration) <= BY_ACCELERATION * self._accuracy
+            self._known[acceleration] = self._holds(acceleration)
         return self._known[acceleration]
+
+    @cached_property
+    def _serves_all(self) -> bool:
+        """Whether modes hold their accuracy up to the other acceleration: errors are convex over it."""
+        return all(self._holds(self._acceleration + share * self.rise) for share in (0.5, 1.0))
+
+    def _holds(self, acceleration: float) -> bool:
+        return self.error(acceleration) <= BY_ACCELERATION * self._accuracy
 
     def error(self, acceleration: float) -> float:
         """Relative error of the worst signal in the range."""

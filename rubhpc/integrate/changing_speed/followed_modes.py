@@ -18,14 +18,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.integrate.changing_speed.near_modes import most_of, weights
+from rubhpc.integrate.changing_speed.near_modes import weights
 from rubhpc.kernels.varying import Course, Varying
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode
-    from rubhpc.kernels.contact_modes import ModeTables
     from rubhpc.kernels.retuning import HeldMode
 
 Floats = NDArray[np.float64]
@@ -45,24 +44,37 @@ EQUAL = 1e-9  # relative difference of two exponents that repeat
 STILL, LEAST = 1e-13, 1e-16  # change of an entry over it, and over the greatest, below which it stays
 NONE = Course(np.zeros(0, dtype=np.int64), np.zeros((1, 0)), np.zeros(0))
 NOTHING = Varying(np.zeros(0), *[NONE] * (len(Varying._fields) - 1))
-_TABLES = "motion_re", "motion_im", "switch_re", "switch_im", "slip_re", "slip_im"
+_TABLES = "motion", "switch", "slip"
 _HELD = "exponent", "motion", "switch", "output", "row"
 _OF_RIM = "motion", "switch", "fixed", "rate", "row"
 _RIM = "rim "
 
 
-class Tabulated(NamedTuple):
-    """A contact mode of one speed, its tables, and what of it is held."""
+class Node(NamedTuple):
+    """A contact mode of one speed, and what of it and of its tables goes with the speed."""
 
     mode: ContactMode
-    row: ModeTables
     held: HeldMode
+    motion: Complexes  # (2 n, width)
+    switch: Complexes  # (r, width)
+    slip: Complexes  # (q, width)
+
+    @classmethod
+    def of(cls, mode: ContactMode, held: HeldMode, slip: Floats) -> Node:
+        """That of a mode; `slip` (q, n) are slip speeds with the motion."""
+        end, n = mode.exponent.size, slip.shape[1]
+        motion, switch, slipping = (
+            np.zeros((rows, held.exponent.size), dtype=np.complex128)
+            for rows in (2 * n, len(mode.switch), len(slip))
+        )
+        motion[:, :end], switch[:, :end], slipping[:, :end] = mode.motion, mode.switch, slip @ mode.motion[n:]
+        return cls(mode, held, motion, switch, slipping)
 
 
 def between(values: Sequence[A], place: float) -> A:
     """What goes through values at `NODES` or `EXACT`, the middle first, at a place in the range."""
     middle, *others = values
-    shares = _shares(place, len(values))
+    shares = shares_of(place, len(values))
     found: A = middle + sum(share * (other - middle) for share, other in zip(shares, others, strict=True))
     return found
 
@@ -126,9 +138,7 @@ def aligned(seen: Complexes, exponent: Complexes) -> tuple[NDArray[np.int64], Co
     return place, turn
 
 
-def followed(
-    nodes: Sequence[Tabulated], risen: Tabulated | None, entered: Entries, seen: Complexes
-) -> HeldMode:
+def followed(nodes: Sequence[Node], risen: Node | None, entered: Entries, seen: Complexes) -> HeldMode:
     """What is held of the mode in the middle, with what of it goes with the speed and its acceleration.
 
     `nodes` are those at `NODES`, the middle first; `risen` is that in the middle at another
@@ -138,11 +148,15 @@ def followed(
     middle, mode = nodes[0], nodes[0].mode
     held, m, n = middle.held, mode.n_eigenmode, seen.size
     of_all, n_node = [*nodes, *([risen] if risen else [])], len(nodes)
-    courses = {name: _through([getattr(node.row, name)[0] for node in of_all], m, n_node) for name in _TABLES}
+    courses = {}
+    for name in _TABLES:
+        values = np.array([getattr(node, name) for node in of_all])
+        courses[name + "_re"] = _through(values.real, m, n_node)
+        courses[name + "_im"] = _through(values.imag, m, n_node)
     enter, take_off = entered.enter, entered.take_off
-    padded = np.zeros((len(enter), *middle.row.enter_re.shape[1:]), dtype=np.complex128)
+    padded = np.zeros((len(enter), *middle.motion.shape), dtype=np.complex128)
     padded[:, :, :m] = enter.transpose(0, 2, 1)
-    constant = np.zeros((len(enter), *middle.row.enter_constant.shape[1:]))
+    constant = np.zeros((len(enter), take_off.shape[1], 2, middle.motion.shape[1]))
     constant[..., 0, :m], constant[..., 1, :m] = take_off.real, take_off.imag
     for name, values in (("enter_re", padded.real), ("enter_im", padded.imag), ("enter_constant", constant)):
         courses[name] = _through(values, m, len(EXACT), skips_response=False)
@@ -193,62 +207,7 @@ class Entries(NamedTuple):
     lost: float  # share of a mode in another, at most, by which it is no inverse between these places
 
 
-def entries(nodes: Sequence[Tabulated], risen: Tabulated | None) -> Entries:
-    """What enters a mode between `NODES`: inverses of its shapes, in the coordinates of those in the middle.
-
-    Modes that stand for a pair have their conjugates behind them; others are complex too where two real
-    exponents come as a pair.
-    """
-    mode, n_node = nodes[0].mode, len(nodes)
-    m, weight = mode.n_eigenmode, weights(mode)
-    of_all = [*nodes[1:], *([risen] if risen else [])]
-    change = np.array([node.mode.motion for node in of_all]) - mode.motion
-    places = [_shares(place, n_node) for place in EXACT]
-    shares = np.zeros((len(places) + bool(risen), len(change)))
-    shares[: len(places), : n_node - 1] = places
-    if risen:
-        shares[-1, -1] = 1.0
-    is_moved = (change[..., :m] != 0.0).any(axis=(0, 1))
-    columns = np.flatnonzero(is_moved)
-    moved = change[..., columns] / weight[columns]
-    is_paired, paired = weight[columns] > 1.5, np.flatnonzero(weight > 1.5)
-    every = np.vstack([mode.enter[:m], mode.enter[paired].conj()])
-    seen = every @ np.concatenate([moved, moved[..., is_paired].conj()], axis=2)
-    # Modes that change, or that others change into, and behind them the conjugates of those that are pairs.
-    pushed = np.abs(seen.view(np.float64)).max(axis=(0, 2), initial=0.0) > LEAST
-    pushed[columns] = True
-    pushed[paired] |= pushed[m:]
-    rows = np.flatnonzero(pushed[:m])
-    pushed[m:] = pushed[paired]
-    both = np.flatnonzero(pushed)
-    behind = m + np.searchsorted(paired, columns[is_paired])
-    mixed = np.zeros((len(change), both.size, both.size), dtype=np.complex128)
-    mixed[..., np.searchsorted(both, np.concatenate([columns, behind]))] = seen[:, both]
-
-    def turned(shares: Floats) -> Complexes:
-        flat = shares @ mixed.view(np.float64).reshape(len(mixed), -1)
-        return flat.view(np.complex128).reshape(-1, both.size, both.size) + np.eye(both.size)
-
-    unit = np.eye(both.size, rows.size)
-    back = np.linalg.solve(turned(shares[1:]).transpose(0, 2, 1), unit).transpose(0, 2, 1)
-    through = [unit.T, *back[: len(EXACT) - 1]]
-    judged = np.zeros((len(JUDGED), len(change)))
-    judged[:, : n_node - 1] = [_shares(place, n_node) for place in JUDGED]
-    kept = turned(judged)[..., : rows.size]
-    lost = max(
-        most_of(between(through, place) @ kept[i] - np.eye(rows.size)) for i, place in enumerate(JUDGED)
-    )
-    found = np.tile(mode.enter[:m], (len(shares), 1, 1))
-    found[1:, rows] = back @ every[both]
-    beyond = mode.motion[:, m:] + np.tensordot(shares, change[..., m:], axes=1)
-    for k in range(m, len(mode.enter)):  # coordinates beside the eigenmodes that motion enters
-        if mode.enter[k].any():
-            found[1:] -= (found[1:] @ beyond[1:, :, k - m, np.newaxis]) * mode.enter[k]
-    constants = beyond[..., 1 : 1 + len(mode.take_off) - 2]
-    return Entries(found, (found @ constants).transpose(0, 2, 1), lost)
-
-
-def _shares(place: float, count: int) -> Floats:
+def shares_of(place: float, count: int) -> Floats:
     """What goes through values at `count` places has of each but the first, less that, at a place."""
     powers: Floats = place ** np.arange(count, dtype=np.float64)
     shares: Floats = (powers @ POWERS[count])[1:]
@@ -260,7 +219,7 @@ def _through(values: Any, m: int, n_node: int, *, skips_response: bool = True) -
 
     The response to unbalance, m, is left out.
     """
-    values = np.array(values)
+    values = np.array(values)  # a copy
     values[1:] -= values[0]
     if skips_response and values.ndim > 1 and values.shape[-1] > m:
         values[1:, ..., m] = 0.0

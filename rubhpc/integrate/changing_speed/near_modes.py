@@ -125,30 +125,39 @@ def weights(mode: ContactMode) -> Floats:
 
 
 def _settled(whole: Complexes, exponent: Complexes, own: int) -> tuple[Complexes, Complexes] | None:
-    """The first modes (p, own), exponents (own,), of `diag(exponent) + whole`; None if they do not settle."""
-    every, itself = np.arange(exponent.size), np.arange(own)
+    """The first modes (p, own), exponents (own,), of `diag(exponent) + whole`; None if they do not settle.
+
+    Each mode is iterated until it has settled itself: those whose exponents are close take longest.
+    """
+    every = np.arange(exponent.size)
     exponent = exponent + whole[every, every]  # so that only what mixes modes is left to be followed
     whole[every, every] = 0.0
-    share = np.eye(exponent.size, own, dtype=np.complex128)
+    share, now = np.eye(exponent.size, own, dtype=np.complex128), exponent[:own].copy()
+    left = every[:own]  # modes that have not settled
     for _ in range(STEPS):
-        given = whole @ share
-        now = exponent[:own] + given[itself, itself]
-        given[itself, itself] = 0.0
-        apart = now - exponent[:, np.newaxis]
-        if np.any((apart == 0.0) & (given != 0.0)):
-            return None
-        apart[apart == 0.0] = 1.0
+        before, itself = share[:, left], (left, every[: left.size])
+        given = whole @ before
+        now[left] = exponent[left] + given[itself]
+        apart = now[left] - exponent[:, np.newaxis]
+        given[itself], apart[itself] = 0.0, 1.0
+        if not apart.all():  # equal exponents: of modes that may not mix
+            is_equal = apart == 0.0
+            if given[is_equal].any():
+                return None
+            apart[is_equal] = 1.0
         found = given / apart
         if not most_of(found) < MOST:
             return None
-        found[itself, itself] = 1.0
-        last, share = most_of(found - share), found
-        if last < SETTLED:
+        found[itself] = 1.0
+        share[:, left] = found
+        changes = np.abs((found - before).view(np.float64)).max(axis=0).reshape(-1, 2).max(axis=1)
+        left = left[changes >= SETTLED]
+        if not left.size:
             return share, now
     return None
 
 
-def most_of(values: Complexes) -> float:
+def most_of(values: Floats | Complexes) -> float:
     """The largest real or imaginary part, without a root for each value."""
     parts = values.view(np.float64)
     return float(max(parts.max(initial=0.0), -parts.min(initial=0.0)))

@@ -88,9 +88,11 @@ class Pieces:
 
         As `setup`, (n_piece,) each; `n_sample` are the samples in each piece, the same in those together.
         """
-        self._ranges.accelerations = float(acceleration.min()), float(acceleration.max())
+        least = np.minimum.accumulate(acceleration[::-1])[::-1].tolist()  # from each piece on
+        greatest = np.maximum.accumulate(acceleration[::-1])[::-1].tolist()
         first = 0
         while first < speed.size:
+            self._ranges.accelerations = least[first], greatest[first]
             held, last = self._find(float(speed[first]), float(acceleration[first])), first + 1
             at_once = SAGGING_AT_ONCE if held.sags else AT_ONCE
             while (

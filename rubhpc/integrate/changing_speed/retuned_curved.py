@@ -63,7 +63,7 @@ class RetunedCurvedLibrary(RetunedLibrary, CurvedLibrary):
         self._still.clear()
         super().forget()
 
-    def _hold(self, mode: ContactMode, row: ModeTables, linear: Linear) -> HeldMode:
+    def _hold(self, mode: ContactMode, row: ModeTables | None, linear: Linear) -> HeldMode:
         directions = self.gap_jacobian, self.force_direction
         self._still[mode.mask] = still_parts(mode, self.reduced, self._row, directions, self.width)
         return super()._hold(mode, row, linear)

@@ -139,7 +139,7 @@ class RetunedFrictionLibrary(RetunedLibrary):
         passed = tangent @ project
         return Linear(passed @ self._phasor, switch, reaction, across, damping, passed)
 
-    def _hold(self, mode: ContactMode, row: ModeTables, linear: Linear) -> HeldMode:
+    def _hold(self, mode: ContactMode, row: ModeTables | None, linear: Linear) -> HeldMode:
         assert isinstance(mode, FrictionMode)
         held = super()._hold(mode, row, linear)
         q = len(self.slip)
@@ -152,14 +152,16 @@ class RetunedFrictionLibrary(RetunedLibrary):
         growing = np.flatnonzero(mode.growth)
         if not switch.any() and not growing.size:
             return held
+        entered = np.zeros(self.width, dtype=np.complex128)
+        entered[: mode.take_off.shape[1]] = mode.take_off[2 + q]
         rim = RimPart(
             one=one,
             motion=mode.motion[:, one].copy(),
-            entered=row.enter_constant[0, q, 0] + 1j * row.enter_constant[0, q, 1],
+            entered=entered,
             switch=switch,
             fixed=fixed,
             rate=mode.switch[:, growing] @ mode.growth[growing].astype(np.complex128),
-            loss=row.loss[0][[one, self.width + one]].copy() if row.loss.shape[1] else row.loss[0],
+            loss=row.loss[0][[one, self.width + one]].copy() if row else np.zeros((0, 0)),
             power=float((held.rate[one] @ held.resisting[one]).real),
             velocity=held.rate[one].copy(),
             resisting=held.resisting[one].copy(),

@@ -14,11 +14,11 @@ import numpy as np
 from rubhpc.integrate.changing_speed.eigenmodes import Eigenmodes
 from rubhpc.integrate.changing_speed.followed_modes import (
     MOST_LOST,
-    Tabulated,
-    entries,
+    Node,
     followed,
     matched,
 )
+from rubhpc.integrate.changing_speed.mode_entries import entries
 from rubhpc.integrate.changing_speed.mode_parts import (
     held_mode,
     output_operators,
@@ -260,8 +260,9 @@ class RetunedLibrary(ModeLibrary):
     def _tabulate(self, mode: ContactMode, row: ModeTables | None = None) -> None:
         self._note_exponents(mode)
         own = self._linear(mode)
-        _, row, held = middle = self._tabulated(mode, own, row)
+        row, held = self._tabulated(mode, own, row)
         if self._beside:
+            middle = Node.of(mode, held, self._slip_rows())
             found = [self._node(mode, own, library) for library in (*self._beside, *self._risen)]
             nodes, n = [middle, *(node for node in found if node is not None)], 1 + len(self._beside)
             if len(nodes) > len(found):
@@ -273,20 +274,22 @@ class RetunedLibrary(ModeLibrary):
                 self._strange.add(mode.mask)
         self._held[mode.mask] = row, held
 
-    def _node(self, mode: ContactMode, own: Linear, library: RetunedLibrary) -> Tabulated | None:
+    def _node(self, mode: ContactMode, own: Linear, library: RetunedLibrary) -> Node | None:
         """The same mode in another library; None where that has another motion."""
         linear = library._linear(mode)
         near = near_mode(mode, (own, linear), self.reduced, library.reduced)
         found = near or matched(mode, library._solved(mode.mask))
-        return library._tabulated(found, linear) if found else None
+        return Node.of(found, library._hold(found, None, linear), library._slip_rows()) if found else None
 
-    def _tabulated(self, mode: ContactMode, linear: Linear, row: ModeTables | None = None) -> Tabulated:
+    def _tabulated(
+        self, mode: ContactMode, linear: Linear, row: ModeTables | None = None
+    ) -> tuple[ModeTables, HeldMode]:
         """A mode of these matrices with what is renewed of its tables left out."""
         row = row or self._tables_of(mode, self.reduced)
         if not self._is_measured:
             row = with_slip(row, self._slip_rows() @ mode.motion[self.slip.shape[1] :], mode.exponent)
         row = without_renewed(row, len(self._output))
-        return Tabulated(mode, row, self._hold(mode, row, linear))
+        return row, self._hold(mode, row if self._is_measured else None, linear)
 
     def _with(self, reduced: ReducedModel) -> RetunedLibrary:
         """A library with other matrices that solves and tabulates as this one does, and holds nothing."""
@@ -300,8 +303,7 @@ class RetunedLibrary(ModeLibrary):
         assert self._at_place is not None
         library = self._with(self._at_place(within, rise))
         mode = library._solved(mask)
-        _, row, held = library._tabulated(mode, library._linear(mode))
-        self._held[mask] = row, held
+        row, _ = self._held[mask] = library._tabulated(mode, library._linear(mode))
         for field, new in zip(self.tables(), row, strict=True):
             field[place] = new[0]
 
@@ -345,8 +347,8 @@ class RetunedLibrary(ModeLibrary):
         directions = self.gap_jacobian, self.force_direction
         return Linear.of_closed(closed, self.reduced, directions, self._phasor)
 
-    def _hold(self, mode: ContactMode, row: ModeTables, linear: Linear) -> HeldMode:
-        """What the spin speed leaves alone of a mode and its tables, (1, ...) each."""
+    def _hold(self, mode: ContactMode, row: ModeTables | None, linear: Linear) -> HeldMode:
+        """What the spin speed leaves alone of a mode and its tables, (1, ...) each; None without energies."""
         return held_mode(
             mode,
             self.reduced,

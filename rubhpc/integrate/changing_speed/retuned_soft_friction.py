@@ -31,9 +31,9 @@ class RetunedSoftFrictionLibrary(RetunedFrictionLibrary):
         rows = overlap_rows(self.gap_jacobian, closed, mode, self.width)
         return Springs(0.5 * self._pairs.stiffness, np.ascontiguousarray(self.gap_jacobian[closed]), rows)
 
-    def _hold(self, mode: ContactMode, row: ModeTables, linear: Linear) -> HeldMode:
+    def _hold(self, mode: ContactMode, row: ModeTables | None, linear: Linear) -> HeldMode:
         held = super()._hold(mode, row, linear)
-        if not self._is_measured:
+        if row is None:
             return held
         m, one = held.is_pair.size, held.rim.one
         moving = [m, self.width + m] if one == NO_RIM else [m, one, self.width + m, self.width + one]

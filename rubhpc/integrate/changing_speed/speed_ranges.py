@@ -8,7 +8,6 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from rubhpc.fem.assemble import model_at
 from rubhpc.fem.free_spin import unit_rotation
 from rubhpc.fem.probes import probes_at
 from rubhpc.fem.statics import sag_under
@@ -54,7 +53,7 @@ class SpeedRanges:
     def __init__(self, fastest: ModalSetup) -> None:
         self._fastest = fastest
         self._basis = fastest.reduced.basis
-        self.accelerations: tuple[float, float] | None = None  # rad/s^2, least and greatest of the run-up
+        self.accelerations: tuple[float, float] | None = None  # rad/s^2, least and greatest to come
         model = fastest.model
         rotor = model.rotor
         self._inertia = rotor.mass @ unit_rotation(rotor)
@@ -216,12 +215,15 @@ class SpeedRanges:
     def _matrices(self, speed: float, acceleration: float, slope: float) -> tuple[Model, Floats, Floats]:
         """The model at a speed, within the tables of its bearings, its damping and its stiffness.
 
+        Its sag is that of the highest speed.
+
         A torque that falls with the speed damps how the driven end turns about the mean.
         """
         model = self._fastest.model
         if model.rotor.tabulated_speeds:
             known = self._tabulated(speed)
-            model = probes_at(model_at(model, known), known, self._fastest.spin)
+            model = replace(model, rotor=model.rotor.at(known))
+            model = probes_at(model, known, self._fastest.spin)
         return model, *self._system(model, speed, acceleration, slope)
 
     def _tabulated(self, speed: float) -> float:
