@@ -13,9 +13,17 @@ Floats = NDArray[np.float64]
 @jit_inline_sum
 def lowest_level(count: int) -> int:
     """Level of the shortest of the powers of two that make up a count of at least one."""
-    level = 0
-    while (count >> level) & 1 == 0:
-        level += 1
+    return leading_level(count & -count)
+
+
+@jit_inline_sum
+def leading_level(count: int) -> int:
+    """Level of the longest of them: six steps for any count, where `floor_log2` takes one a level."""
+    level, rest = 0, count
+    for halving in range(6):
+        shift = 32 >> halving
+        if rest >> shift > 0:
+            level, rest = level + shift, rest >> shift
     return level
 
 

@@ -6,13 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, short_loops
-from rubhpc.kernels.contact_modes import positive_interval
 from rubhpc.kernels.friction_states import OPEN, state_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 THIRD, SIXTH = 1.0 / 3.0, 1.0 / 6.0
+STRIDE, N_STRIDE = 8.0, 4  # factors by which times are tried: this one, its square root, and so on
+LESS = 0.585  # below 2 - sqrt(2): |x + i y| is at most x + y less this times the smaller, x and y positive
 FREE, SURE = range(2)  # rows of what is known of the switch functions
 
 
@@ -27,12 +28,12 @@ def free_until(
     rate_im: Floats,
     bend_re: Floats,
     bend_im: Floats,
-    bound: Floats,
     turn: Floats,
     z_re: Floats,
     z_im: Floats,
     now: int,
     tick: float,
+    shortest: int,
     longest: int,
     known: Ints,
 ) -> tuple[int, int]:
@@ -43,10 +44,9 @@ def free_until(
     now : int
         Tick at which the coordinates stand; each lasts `tick` (s).
     turn : (p, 2 q, m)
-        As in `ModeTables`: negative for coordinates that decay fast without vibration. They are bounded by
-        what they are now, not by a series.
-    longest : int
-        Ticks beyond which none is asked for.
+        As in `ModeTables`: negative for coordinates that decay fast without vibration.
+    shortest, longest : int
+        Ticks less than which are taken for none, and beyond which none is asked for.
     known : (2, 2 q)
         The tick before which each of them cannot vanish, and that before which it does so once at most and
         stays negative, as they were proved last: those alone are asked anew that come before the others. In
@@ -75,42 +75,39 @@ def free_until(
                 rate_re[mode, j],
                 rate_im[mode, j],
             )
-            bending_re, bending_im, weight, next_weight = (
-                bend_re[mode, j],
-                bend_im[mode, j],
-                bound[mode, j],
-                turn[mode, j],
-            )
-            value, rate, bend, most_bend, most_turn = 0.0, 0.0, 0.0, 0.0, 0.0
-            fast_size, fast_rate, gain, rise = 0.0, 0.0, 0.0, 0.0
+            bending_re, bending_im, weight = bend_re[mode, j], bend_im[mode, j], turn[mode, j]
+            value, rate, bend, slow_turn = 0.0, 0.0, 0.0, 0.0
+            gain, fast_rate, rise, fast_bend, fast_turn = 0.0, 0.0, 0.0, 0.0, 0.0
             for k in range(z_re.size):  # in one loop: several would wait for their sums as often
-                a, b = z_re[k], z_im[k]
-                size, cubed = abs(a) + abs(b), next_weight[k]
-                part, turned = re[k] * a - im[k] * b, turning_re[k] * a - turning_im[k] * b
+                a, b, cubed = z_re[k], z_im[k], weight[k]
+                x, y = abs(a), abs(b)
+                turned, part = turning_re[k] * a - turning_im[k] * b, re[k] * a - im[k] * b
                 bent = bending_re[k] * a - bending_im[k] * b
+                third = cubed * (x + y - LESS * min(x, y))
+                fast = 1.0 if cubed < 0.0 else 0.0
+                pushed = fast if part > 0.0 else 0.0
                 value += part
                 rate += turned
-                most_bend += weight[k] * size
-                fast = 1.0 if cubed < 0.0 else 0.0
+                bend += bent
+                slow_turn += max(third, 0.0)
+                gain += pushed * part
+                fast_turn += pushed * third
                 fast_rate += fast * turned
-                fast_size += fast * part
-                gain += fast * abs(part)
-                rise += fast * abs(turned)
-                bend += bent - fast * bent
-                most_turn += max(cubed, 0.0) * size
-            gain, rise = 0.5 * (gain + fast_size), 0.5 * (rise + fast_rate)
-            slow_rate = rate - fast_rate
-            free = min(positive_interval(value, rate, most_bend), most)
-            # What decays adds no less than nothing where it is positive, and no less than now elsewhere.
-            least = value - gain
-            if least > 0.0:
-                while free < most and is_positive(least, slow_rate, bend, most_turn, 2.0 * free):
-                    free *= 2.0
-                if free < most and is_positive(least, slow_rate, bend, most_turn, 1.5 * free):
-                    free *= 1.5
+                rise += fast * max(turned, 0.0)
+                fast_bend += fast * bent
+            slow_rate, slow_bend = rate - fast_rate, bend - fast_bend
+            free = min(
+                positive_until(
+                    (value, rate, bend, slow_turn - fast_turn),
+                    (value - gain, slow_rate, slow_bend, slow_turn),
+                    shortest * tick,
+                    most,
+                ),
+                most,
+            )
             sure = free
             if value > 0.0:
-                sure = max(free, falling_until(slow_rate + rise, bend, most_turn, free))
+                sure = max(free, falling_until(slow_rate + rise, slow_bend, slow_turn, free))
             known[FREE, j] = now + int(free / tick)
             known[SURE, j] = now + int(min(sure, most) / tick)
             reached = min(reached, known[SURE, j])
@@ -122,11 +119,35 @@ def free_until(
 
 
 @jit_inline_sum
-def is_positive(value: float, rate: float, bend: float, turn: float, time: float) -> bool:
+def positive_until(
+    whole: tuple[float, float, float, float],
+    slow: tuple[float, float, float, float],
+    shortest: float,
+    most: float,
+) -> float:
+    """Time (s) until which one of two cubics is positive: `shortest` at least, about `most` at most, or 0.
+
+    Both are lower bounds. The `whole` one is Taylor's: a decay from x at a rate r is no less than
+    `x (1 - r t + (r t)^2 / 2)` where x is negative, and less by `x (r t)^3 / 6` at most elsewhere. In the
+    `slow` one it is no less than nothing where x is positive, and no less than x elsewhere.
+    """
+    if not (is_positive(whole, shortest) or is_positive(slow, shortest)):
+        return 0.0
+    time, longer = shortest, STRIDE
+    for _ in range(N_STRIDE):
+        while time < most and (is_positive(whole, longer * time) or is_positive(slow, longer * time)):
+            time *= longer
+        longer = np.sqrt(longer)
+    return time
+
+
+@jit_inline_sum
+def is_positive(cubic: tuple[float, float, float, float], time: float) -> bool:
     """Whether `value + rate t + bend t^2 / 2 - turn t^3 / 6` is positive up to a time (s).
 
     It is if its coefficients in Bernstein's polynomials are.
     """
+    value, rate, bend, turn = cubic
     third, sixth = rate * time * THIRD, bend * time * time * SIXTH
     second = value + 2.0 * third + sixth
     last = value + 3.0 * third + 3.0 * sixth - turn * time * time * time * SIXTH

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, short_loops
-from rubhpc.kernels.contact_modes import ModeTables, dot, floor_log2
-from rubhpc.kernels.coordinate_steps import go_on
+from rubhpc.kernels.contact_modes import ModeTables, dot
+from rubhpc.kernels.coordinate_steps import go_on, leading_level
 from rubhpc.kernels.event_bounds import FREE
 from rubhpc.kernels.event_steps import GAP_TOLERANCE
 from rubhpc.kernels.friction_coordinates import used_width
@@ -220,7 +220,7 @@ def approach_change(
         if tried <= NEWTON_TRIES and 1.0 * before <= root < 1.0 * after:
             place = min(max(int(root), before + 1), after - 1)
             if tried == 1:  # no more digits than are known
-                place = max(place - place % (1 << floor_log2(max(1, place >> KNOWN_BITS))), 1)
+                place = max(place - place % (1 << leading_level(max(1, place >> KNOWN_BITS))), 1)
         move_ticks(tables, bodies, mode, place - before, clock.tick, z, work)
         found = changes_at(tables, mode, work, overlap, now + place, known)
         crossing = found if found != 0 else crossing

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline, jit_lean_sum
+from rubhpc.kernels._jit import jit_inline, jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.accumulators import PRESSING, Accumulator
 from rubhpc.kernels.complementarity import UNSOLVED
 from rubhpc.kernels.contact_modes import Reduced  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.contact_pairs import Workspace  # noqa: TC001 - likewise
 from rubhpc.kernels.coulomb_friction import ROUNDING
+from rubhpc.kernels.event_forces import FrictionWork, solve_expected
 from rubhpc.kernels.friction_events import (
-    FrictionWork,
     add_kick,
     bring_to_rest,
     collide,
@@ -20,7 +20,6 @@ from rubhpc.kernels.friction_events import (
     part_pairs,
     rate_without_forces,
     see_pairs,
-    solve_event,
 )
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, FrictionBodies, state_of
 from rubhpc.kernels.soft_friction_events import press_pairs
@@ -60,7 +59,7 @@ def change_states(
     return found
 
 
-@jit_lean_sum
+@jit_inline_sum
 def change_seen(
     reduced: Reduced,
     bodies: FrictionBodies,
@@ -93,7 +92,7 @@ def change_seen(
         if not collide(reduced, bodies, states, crossing, is_recorded, work, accumulator):
             return -1
         part_pairs(bodies, moment, cosine, sine, work)
-    pivots = solve_event(bodies, work, False)
+    pivots = solve_expected(bodies, states, crossing, work, False)
     if pivots == UNSOLVED:
         return -1
     if is_recorded:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline, jit_inline_sum, jit_lean
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean
 from rubhpc.kernels.accumulators import (
     IMPACT,
     IMPACT_LOSS,
@@ -16,110 +14,21 @@ from rubhpc.kernels.accumulators import (
     observe_sense,
     observe_solution,
 )
-from rubhpc.kernels.complementarity import UNSOLVED, natural_residual, solve_active
+from rubhpc.kernels.complementarity import UNSOLVED, natural_residual
 from rubhpc.kernels.contact_modes import Reduced  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.contact_pairs import Workspace  # noqa: TC001 - likewise
-from rubhpc.kernels.coulomb_friction import ROUNDING, UNNOTICED, friction_residual, solve_cones
+from rubhpc.kernels.coulomb_friction import ROUNDING, friction_residual
+from rubhpc.kernels.event_forces import (
+    FrictionWork,
+    gap_change,
+    slip_change,
+    solve_active_pairs,
+    solve_expected,
+)
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, FrictionBodies, state_of
 from rubhpc.kernels.mode_change import AT_REST, OPENING, product
-from rubhpc.kernels.trail import Trail, no_trail
 
 Floats = NDArray[np.float64]
-
-
-class FrictionWork(NamedTuple):
-    """Work space of an event, q pairs."""
-
-    solver: Workspace  # compliances are those of velocities, 1/kg
-    rate: Floats  # (q,), of gaps, m/s
-    slip: Floats  # (q,), m/s
-    drawn: Floats  # (2 q,), how rates of gaps, then of slips change with the motion, `pull` times it, m/s2
-    given: Floats  # (2, q), normal impulses of the event and tractions, N s
-    kick: Floats  # (n,), what they add to the velocity, m/s
-    free_until: NDArray[
-        np.int64
-    ]  # (2, 2 q), what is known of the switch functions: `event_bounds.free_until`
-    impulse: Floats  # (q,), accumulated before the event, N s
-    rest: Floats  # (2 q, 2 q), rates of the gaps, then slips, by impulses along them, 1/kg
-    rest_speed: Floats  # (2 q,), m/s
-    rest_impulse: Floats  # (2 q,), N s
-    is_at_rest: NDArray[np.bool_]  # (2 q,)
-    elimination: Floats  # (2 q, 2 q + 1)
-    trail: Trail  # of the motion
-
-
-def friction_work(solver: Workspace, q: int, n: int) -> FrictionWork:
-    """Work space of the events of q pairs and n coordinates, with that of their laws, without a trail."""
-    return FrictionWork(
-        solver=solver,
-        rate=np.zeros(q),
-        slip=np.zeros(q),
-        drawn=np.zeros(2 * q),
-        given=np.zeros((2, q)),
-        kick=np.zeros(n),
-        free_until=np.zeros((2, 2 * q), dtype=np.int64),
-        impulse=np.zeros(q),
-        rest=np.zeros((2 * q, 2 * q)),
-        rest_speed=np.zeros(2 * q),
-        rest_impulse=np.zeros(2 * q),
-        is_at_rest=np.zeros(2 * q, dtype=np.bool_),
-        elimination=np.zeros((2 * q, 2 * q + 1)),
-        trail=no_trail(),
-    )
-
-
-@jit_lean
-def solve_event(bodies: FrictionBodies, work: FrictionWork, feeds_none: bool) -> int:
-    """Forces or impulses that obey the laws with `solver.gap` and `slip`; pivots taken, or UNSOLVED.
-
-    A pair that sticks holds up to the coefficient of rest; once that is passed it slides. With `feeds_none`,
-    a pair whose friction would feed energy in, because its slip turns round, has none.
-    """
-    solver = work.solver
-    q = solver.force.size
-    for i in range(q):
-        solver.cone[i] = bodies.static[i] if solver.is_sticking[i] else bodies.sliding[i]
-    pivots = 0
-    for _ in range(2 * q + 1):
-        taken = solve_cones(solver)
-        if taken == UNSOLVED:
-            return UNSOLVED
-        pivots += taken
-        is_settled = True
-        for i in range(q):
-            bound = solver.cone[i] * solver.force[i]
-            if solver.cone[i] > bodies.sliding[i] and abs(solver.traction[i]) >= bound * (1.0 - ROUNDING):
-                solver.cone[i] = bodies.sliding[i]
-                is_settled = False
-            elif feeds_none and bound > 0.0:
-                both = 2.0 * solver.slip[i] + slip_change(solver, i)
-                least = UNNOTICED * abs(solver.tangential[1, i, i]) * bound
-                if solver.traction[i] * both < -abs(solver.traction[i]) * least:
-                    solver.cone[i] = 0.0
-                    is_settled = False
-        if is_settled:
-            return pivots
-    return pivots
-
-
-@jit_inline
-def slip_change(solver: Workspace, i: int) -> float:
-    """Change of the slip of pair i by the forces found."""
-    change = 0.0
-    for j in range(solver.force.size):
-        change += (
-            solver.tangential[0, i, j] * solver.force[j] + solver.tangential[1, i, j] * solver.traction[j]
-        )
-    return change
-
-
-@jit_inline
-def gap_change(solver: Workspace, i: int) -> float:
-    """Change of the gap of pair i by the forces found."""
-    change = 0.0
-    for j in range(solver.force.size):
-        change += solver.matrix[i, j] * solver.force[j] + solver.coupling[i, j] * solver.traction[j]
-    return change
 
 
 @jit_lean
@@ -230,7 +139,7 @@ def collide(
             solver.gap[i] = 0.0
     if not is_impact:
         return True
-    pivots = solve_event(bodies, work, True)
+    pivots = solve_expected(bodies, states, crossing, work, True)
     if pivots == UNSOLVED:
         return False
     for i in range(work.rate.size):
@@ -292,7 +201,7 @@ def bring_to_rest(
     has been slipping at the tick before its slip vanishes.
     """
     q = work.rate.size
-    solver, moves = work.solver, False
+    moves = False
     for i in range(q):
         state = state_of(states, i)
         work.rest_speed[i], work.rest_speed[q + i] = work.rate[i], work.slip[i]
@@ -302,23 +211,8 @@ def bring_to_rest(
         moves = moves or (state == STUCK and abs(work.slip[i]) > AT_REST)
     if not moves:
         return
-    for i in range(q):
-        for j in range(q):
-            state = state_of(states, j)
-            rubs = 0.0
-            if state in (FORWARD, BACKWARD):
-                rubs = bodies.sliding[j] if state == FORWARD else -bodies.sliding[j]
-            work.rest[i, j] = solver.matrix[i, j] + rubs * solver.coupling[i, j]
-            work.rest[q + i, j] = solver.tangential[0, i, j] + rubs * solver.tangential[1, i, j]
-            work.rest[i, q + j], work.rest[q + i, q + j] = solver.coupling[i, j], solver.tangential[1, i, j]
-    if not solve_active(work.rest, work.rest_speed, work.is_at_rest, work.rest_impulse, work.elimination):
+    if not solve_active_pairs(bodies, states, work):
         return
-    for i in range(q):
-        state = state_of(states, i)
-        solver.force[i], solver.traction[i] = work.rest_impulse[i], work.rest_impulse[q + i]
-        if state in (FORWARD, BACKWARD):
-            sense = 1.0 if state == FORWARD else -1.0
-            solver.traction[i] = sense * bodies.sliding[i] * solver.force[i]
     if is_recorded:
         observe_impacts(bodies, work, accumulator)
     give_impulses(reduced, work)

@@ -24,13 +24,14 @@ from rubhpc.kernels.case_progress import (
     Clock,
     Progress,
 )
-from rubhpc.kernels.contact_modes import ModeTables, Reduced, floor_log2
-from rubhpc.kernels.coordinate_steps import go_on, turn_on
+from rubhpc.kernels.contact_modes import ModeTables, Reduced  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.coordinate_steps import go_on, leading_level, turn_on
 from rubhpc.kernels.event_bounds import free_until
+from rubhpc.kernels.event_forces import FrictionWork  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.event_search import approach_change, find_change, move_stuck
 from rubhpc.kernels.event_steps import choose_step, contact_age, end_samples, longest_step, sample_step
 from rubhpc.kernels.friction_coordinates import begin_energies, end_energies, enter_states, used_width
-from rubhpc.kernels.friction_events import FrictionWork, observe_states
+from rubhpc.kernels.friction_events import observe_states
 from rubhpc.kernels.friction_measuring import begin_friction, observe_friction, resolved_friction
 from rubhpc.kernels.friction_passage import take_change
 from rubhpc.kernels.friction_states import FrictionBodies, stuck_pairs
@@ -78,7 +79,7 @@ def advance_with_friction(
     """
     # Tuples are opened here: a field read inside the loop would count a reference at every step.
     mask, switch_re, switch_im = tables.mask, tables.switch_re, tables.switch_im
-    rate_re, rate_im, bound = tables.rate_re, tables.rate_im, tables.bound
+    rate_re, rate_im = tables.rate_re, tables.rate_im
     bend_re, bend_im, turn = tables.bend_re, tables.bend_im, tables.turn
     power_re, power_im, n_eigenmode = tables.power_re, tables.power_im, tables.n_eigenmode
     rim_speed = bodies.rim_speed
@@ -119,7 +120,9 @@ def advance_with_friction(
         mode = progress.mode
         states = mask[mode]
         is_ahead = is_sample and states == 0
-        longest = longest_step(clock, last_tick, highest_level, is_recorded, is_ahead, progress.tick)
+        longest, left = highest_level, last_tick - progress.tick
+        if is_recorded or left < 1 << highest_level:
+            longest = longest_step(clock, last_tick, highest_level, is_recorded, is_ahead, progress.tick)
         is_measured, finest = is_recorded and states != 0, 1 << clock.sample_level
         if is_measured and progress.tick > progress.entered:
             age = contact_age(progress)
@@ -129,7 +132,7 @@ def advance_with_friction(
                 progress.contact_age = age
                 progress.resolved = int(max(1.0, min(resolved / clock.tick, 1.0 * finest)))
             finest = min(finest, progress.resolved)
-            longest = min(longest, floor_log2(finest))
+            longest = min(longest, leading_level(finest))
         if not is_at_event and progress.tick >= renewed_at and progress.tick + (1 << longest) > sure_to:
             free_to, sure_to = free_until(
                 states,
@@ -140,26 +143,26 @@ def advance_with_friction(
                 rate_im,
                 bend_re,
                 bend_im,
-                bound,
                 turn,
                 z_re,
                 z_im,
                 progress.tick,
                 clock.tick,
+                1 << clock.search_level,
                 1 << highest_level,
                 work.free_until,
             )
             renewed_at = sure_to - (sure_to - progress.tick) // WORTH_ASKING
         is_forced = progress.is_after_event == 1
-        level, _ = choose_step(clock, progress, longest, (sure_to - progress.tick) * clock.tick)
-        count = 1 << level
-        if not is_forced and not is_at_event:
-            if is_measured:
+        if is_recorded or is_at_event:
+            level, _ = choose_step(clock, progress, longest, (sure_to - progress.tick) * clock.tick)
+            count = 1 << level
+            if is_measured and not is_at_event:
                 count = measured_step(clock, last_tick, finest, sure_to, progress)
-            elif not is_recorded:
-                reach = min(sure_to, last_tick) - progress.tick
-                count = max(count, leading(min(reach, 1 << highest_level)))
-                level = floor_log2(count)
+        else:
+            reach = min(sure_to - progress.tick, left, 1 << highest_level)
+            count = max(leading(reach), 1 << min(longest, clock.search_level))
+            level = leading_level(count)
         step, ends = count * clock.tick, progress.tick + count
         progress.n_step += 1
         is_checked, crossing = not is_forced and ends > free_to, int(np.int64(0))
@@ -252,7 +255,7 @@ def advance_with_friction(
 @jit_inline_sum
 def leading(count: int) -> int:
     """The count of ticks less all but its first bits; 0 of none."""
-    unit = 1 << max(floor_log2(max(count, 1)) - FEW_BITS, 0)
+    unit = 1 << max(leading_level(max(count, 1)) - FEW_BITS, 0)
     return int(max(count, 0) // unit * unit)
 
 
@@ -269,6 +272,6 @@ def measured_step(clock: Clock, last_tick: int, finest: int, sure_to: int, progr
     most = min(finest, max(sure_to - now, 1 << clock.search_level))
     n_step = (ahead + most - 1) // most
     count = (ahead + n_step - 1) // n_step
-    unit = max(1, (1 << floor_log2(finest)) >> FEW_BITS)
+    unit = max(1, (1 << leading_level(finest)) >> FEW_BITS)
     whole = (count + unit - 1) // unit * unit
     return min(ahead, whole if whole <= most else max(most // unit * unit, count % unit))

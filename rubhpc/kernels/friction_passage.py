@@ -19,10 +19,11 @@ from rubhpc.kernels.case_progress import (
     shaft_turn,
 )
 from rubhpc.kernels.contact_modes import FORCED_LEVEL, ModeTables, Reduced, find_mode, is_beyond
+from rubhpc.kernels.event_forces import FrictionWork  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.event_steps import count_event, record_event, record_touch
 from rubhpc.kernels.friction_change import change_seen
 from rubhpc.kernels.friction_coordinates import begin_states, end_energies, leave_states, used_width
-from rubhpc.kernels.friction_events import FrictionWork, add_kick, see_pairs, takes_part, touches
+from rubhpc.kernels.friction_events import add_kick, see_pairs, takes_part, touches
 from rubhpc.kernels.friction_states import OPEN, FrictionBodies, state_of
 from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.trail import note_after, note_event

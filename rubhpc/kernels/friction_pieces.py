@@ -17,8 +17,8 @@ from rubhpc.kernels.case_progress import (
     Progress,
 )
 from rubhpc.kernels.contact_modes import FORCED_LEVEL, ModeTables, Reduced, dot, is_within
+from rubhpc.kernels.event_forces import FrictionWork  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.friction_change import change_states
-from rubhpc.kernels.friction_events import FrictionWork  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.friction_loop import advance_with_friction
 from rubhpc.kernels.friction_states import (
     BACKWARD,

@@ -15,7 +15,7 @@ from rubhpc.kernels.sections_loop import note_section
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
     from rubhpc.kernels.contact_modes import ModeTables, Reduced
-    from rubhpc.kernels.friction_events import FrictionWork
+    from rubhpc.kernels.event_forces import FrictionWork
     from rubhpc.kernels.friction_states import FrictionBodies
     from rubhpc.kernels.sampling import Recorder
     from rubhpc.kernels.transitions import Transitions

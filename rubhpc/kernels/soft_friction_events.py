@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_lean_sum
 from rubhpc.kernels.contact_modes import Reduced  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.event_forces import FrictionWork  # noqa: TC001 - likewise
 from rubhpc.kernels.event_steps import GAP_TOLERANCE
-from rubhpc.kernels.friction_events import FrictionWork  # noqa: TC001 - likewise
 from rubhpc.kernels.friction_states import (
     BACKWARD,
     FORWARD,

@@ -22,6 +22,7 @@ UNKNOWN = -1  # place of what is not tabulated
 WORTH_A_TABLE = 64  # passages after which a transition is tabulated
 LANES = 8  # columns of a block are filled up to whole vectors
 SEEN = 4  # rows of a pair: rate of the gap, slip, and what changes them (`FrictionWork.drawn`)
+DECAYED = 1e-60  # coordinates of less are taken for nothing
 GIVEN = 2  # rows of a pair: coordinates after a unit impulse, then a unit traction
 
 
@@ -97,53 +98,55 @@ def add_impulses(transitions: Transitions, mode: int, q: int, m: int, given: Flo
 @short_loops
 def pass_over(transitions: Transitions, place: int, m: int, z: Floats, after: Floats) -> None:
     """Fill the coordinates `after` (2, m) in the next mode, but for those that do not move, from `z`."""
-    number, value, source, target = (
-        transitions.number,
-        transitions.value,
-        transitions.source,
-        transitions.target,
-    )
+    number, source, target = transitions.number, transitions.source, transitions.target
+    before, following = z.reshape(2 * m), after.reshape(2 * m)
     n_kept, n_block = number[place], number[place + 1]
     place += 2
-    for k in range(m):
-        after[0, k], after[1, k] = 0.0, 0.0
+    for k in range(2 * m):
+        following[k] = 0.0
     for k in range(n_kept):
-        here, there = number[place + k], number[place + n_kept + k]
-        part, other = (1 if here >= m else 0), (1 if there >= m else 0)
-        after[part, here - part * m] = z[other, there - other * m]
+        following[number[place + k]] = before[number[place + n_kept + k]]
     place += 2 * n_kept
     for _ in range(n_block):
         n_source, n_target, at = number[place], number[place + 1], number[place + 2]
         place += 3
         width = (n_target + LANES - 1) // LANES * LANES
-        for k in range(n_source):
-            there = number[place + k]
-            part = 1 if there >= m else 0
-            source[k] = z[part, there - part * m]
-        place += n_source
-        times_rows(value[at:], n_source, width, source, target)
-        for k in range(n_target):
-            here = number[place + k]
-            part = 1 if here >= m else 0
-            after[part, here - part * m] = target[k]
-        place += n_target
+        places, rows = number[place : place + n_source + n_target], transitions.value[at:]
+        pass_block(rows, n_source, width, places, before, source, target, following)
+        place += n_source + n_target
 
 
 @jit_apart_sum
 @short_loops
-def times_rows(rows: Floats, n_row: int, width: int, value: Floats, total: Floats) -> None:
-    """Fill `total` (width,) with rows (n_row width,) times values (n_row,): eight rows at a time."""
+def pass_block(
+    rows: Floats,
+    n_row: int,
+    width: int,
+    places: Ints,
+    before: Floats,
+    value: Floats,
+    total: Floats,
+    after: Floats,
+) -> None:
+    """Pass a block over: rows (n_row width,) times coordinates `before` (2 m,), eight rows at a time.
+
+    `places` are those of its sources, then of its targets. Sources that have decayed are left out.
+    """
     whole, last = n_row - n_row % 8, total[:width]
+    for k in range(n_row):
+        value[k] = before[places[k]]
     for k in range(width):
         last[k] = 0.0
     for row in range(0, whole, 8):
         at = row * width
+        a, b, c, d = value[row], value[row + 1], value[row + 2], value[row + 3]
+        e, f, g, h = value[row + 4], value[row + 5], value[row + 6], value[row + 7]
+        if abs(a) + abs(b) + abs(c) + abs(d) + abs(e) + abs(f) + abs(g) + abs(h) < DECAYED:
+            continue
         first, second = rows[at : at + width], rows[at + width : at + 2 * width]
         third, fourth = rows[at + 2 * width : at + 3 * width], rows[at + 3 * width : at + 4 * width]
         fifth, sixth = rows[at + 4 * width : at + 5 * width], rows[at + 5 * width : at + 6 * width]
         seventh, eighth = rows[at + 6 * width : at + 7 * width], rows[at + 7 * width : at + 8 * width]
-        a, b, c, d = value[row], value[row + 1], value[row + 2], value[row + 3]
-        e, f, g, h = value[row + 4], value[row + 5], value[row + 6], value[row + 7]
         for k in range(width):
             last[k] += (first[k] * a + second[k] * b + third[k] * c + fourth[k] * d) + (
                 fifth[k] * e + sixth[k] * f + seventh[k] * g + eighth[k] * h
@@ -152,6 +155,8 @@ def times_rows(rows: Floats, n_row: int, width: int, value: Floats, total: Float
         first, a = rows[row * width : (row + 1) * width], value[row]
         for k in range(width):
             last[k] += first[k] * a
+    for k in range(places.size - n_row):
+        after[places[n_row + k]] = last[k]
 
 
 @jit_lean_sum

@@ -12,7 +12,7 @@ TICK = 1e-6  # s
 
 @pytest.fixture(autouse=True)
 def in_python(monkeypatch):
-    for name in ("positive_interval", "is_positive", "falling_until", "state_of"):
+    for name in ("positive_until", "is_positive", "falling_until", "state_of"):
         monkeypatch.setattr(event_bounds, name, plain(getattr(event_bounds, name)))
 
 
@@ -34,11 +34,10 @@ def test_no_function_changes_unseen_within_the_interval_that_is_promised(n_fast)
         derivatives = (of[None] for term in (rows, rate, bend) for of in (term.real, term.imag))
         turn = size * abs(exponents) ** 3
         turn[:, :n_fast] *= -1.0
-        bounds = (size * abs(exponents) ** 2)[None], turn[None]
         z_re, z_im = np.ones(m), np.zeros(m)
         known = np.zeros((2, 2), dtype=np.int64)
-        now, longest = 7, 10_000
-        given = (FORWARD, 0, *derivatives, *bounds, z_re, z_im, now, TICK, longest)
+        now, shortest, longest = 7, 1, 10_000
+        given = (FORWARD, 0, *derivatives, turn[None], z_re, z_im, now, TICK, shortest, longest)
         free, sure = plain(event_bounds.free_until)(*given, known)
         assert now <= free <= sure == known[1].min() <= now + longest
         assert free <= known[0].min()

@@ -23,8 +23,8 @@ NAMES = (
     "dot",
     "state_of",
 )
-NAMES += ("stuck_pairs", "used_width", "floor_log2")
-STEPS = ("turn_on", "lowest_level")
+NAMES += ("stuck_pairs", "used_width", "leading_level")
+STEPS = ("turn_on", "lowest_level", "leading_level")
 
 
 @pytest.fixture(autouse=True)

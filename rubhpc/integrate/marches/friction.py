@@ -25,8 +25,8 @@ from rubhpc.kernels.case_progress import (
     shaft_angle,
 )
 from rubhpc.kernels.contact_modes import ModeTables
+from rubhpc.kernels.event_forces import friction_work
 from rubhpc.kernels.friction_change import change_states
-from rubhpc.kernels.friction_events import friction_work
 from rubhpc.kernels.friction_loop import advance_with_friction
 from rubhpc.kernels.friction_pieces import AT_REST, LEAST_FORCE, advance_friction_pieces
 from rubhpc.kernels.friction_sections import advance_friction_sections
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
     from rubhpc.kernels.accumulators import Accumulator, Samples
     from rubhpc.kernels.contact_pairs import Workspace
-    from rubhpc.kernels.friction_events import FrictionWork
+    from rubhpc.kernels.event_forces import FrictionWork
     from rubhpc.kernels.pieces import Pieces
     from rubhpc.kernels.trail import Trail
     from rubhpc.kernels.transitions import Transitions

@@ -1,0 +1,216 @@
+"""Forces and impulses of an event under set-valued friction, pairs rigid or with a penalty.
+
+Most events go as expected: pairs that are closed stay so, and slide or stick as before. The forces of these
+states solve a linear system; where they obey the laws, all is found. Otherwise Lemke's method finds forces,
+in some five pivots of a larger tableau, or finds that there are none.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit_inline, jit_inline_sum, jit_lean
+from rubhpc.kernels.complementarity import UNSOLVED, solve_active
+from rubhpc.kernels.contact_pairs import Workspace  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.coulomb_friction import ROUNDING, UNNOTICED, solve_cones
+from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, FrictionBodies, state_of
+from rubhpc.kernels.trail import Trail, no_trail
+
+Floats = NDArray[np.float64]
+
+CLEARLY = 1e-9  # share by which expected forces are to be within the laws
+
+
+class FrictionWork(NamedTuple):
+    """Work space of an event, q pairs."""
+
+    solver: Workspace  # compliances are those of velocities, 1/kg
+    rate: Floats  # (q,), of gaps, m/s
+    slip: Floats  # (q,), m/s
+    drawn: Floats  # (2 q,), how rates of gaps, then of slips change with the motion, `pull` times it, m/s2
+    given: Floats  # (2, q), normal impulses of the event and tractions, N s
+    kick: Floats  # (n,), what they add to the velocity, m/s
+    free_until: NDArray[
+        np.int64
+    ]  # (2, 2 q), what is known of the switch functions: `event_bounds.free_until`
+    impulse: Floats  # (q,), accumulated before the event, N s
+    rest: Floats  # (2 q, 2 q), rates of the gaps, then slips, by impulses along them, 1/kg
+    rest_speed: Floats  # (2 q,), m/s
+    rest_impulse: Floats  # (2 q,), N s
+    is_at_rest: NDArray[np.bool_]  # (2 q,)
+    elimination: Floats  # (2 q, 2 q + 1)
+    trail: Trail  # of the motion
+
+
+def friction_work(solver: Workspace, q: int, n: int) -> FrictionWork:
+    """Work space of the events of q pairs and n coordinates, with that of their laws, without a trail."""
+    return FrictionWork(
+        solver=solver,
+        rate=np.zeros(q),
+        slip=np.zeros(q),
+        drawn=np.zeros(2 * q),
+        given=np.zeros((2, q)),
+        kick=np.zeros(n),
+        free_until=np.zeros((2, 2 * q), dtype=np.int64),
+        impulse=np.zeros(q),
+        rest=np.zeros((2 * q, 2 * q)),
+        rest_speed=np.zeros(2 * q),
+        rest_impulse=np.zeros(2 * q),
+        is_at_rest=np.zeros(2 * q, dtype=np.bool_),
+        elimination=np.zeros((2 * q, 2 * q + 1)),
+        trail=no_trail(),
+    )
+
+
+@jit_lean
+def solve_event(bodies: FrictionBodies, work: FrictionWork, feeds_none: bool) -> int:
+    """Forces or impulses that obey the laws with `solver.gap` and `slip`; pivots taken, or UNSOLVED.
+
+    A pair that sticks holds up to the coefficient of rest; once that is passed it slides. With `feeds_none`,
+    a pair whose friction would feed energy in, because its slip turns round, has none.
+    """
+    solver = work.solver
+    q = solver.force.size
+    for i in range(q):
+        solver.cone[i] = bodies.static[i] if solver.is_sticking[i] else bodies.sliding[i]
+    pivots = 0
+    for _ in range(2 * q + 1):
+        taken = solve_cones(solver)
+        if taken == UNSOLVED:
+            return UNSOLVED
+        pivots += taken
+        is_settled = True
+        for i in range(q):
+            bound = solver.cone[i] * solver.force[i]
+            if solver.cone[i] > bodies.sliding[i] and abs(solver.traction[i]) >= bound * (1.0 - ROUNDING):
+                solver.cone[i] = bodies.sliding[i]
+                is_settled = False
+            elif feeds_none and bound > 0.0:
+                both = 2.0 * solver.slip[i] + slip_change(solver, i)
+                least = UNNOTICED * abs(solver.tangential[1, i, i]) * bound
+                if solver.traction[i] * both < -abs(solver.traction[i]) * least:
+                    solver.cone[i] = 0.0
+                    is_settled = False
+        if is_settled:
+            return pivots
+    return pivots
+
+
+@jit_inline
+def slip_change(solver: Workspace, i: int) -> float:
+    """Change of the slip of pair i by the forces found."""
+    change = 0.0
+    for j in range(solver.force.size):
+        change += (
+            solver.tangential[0, i, j] * solver.force[j] + solver.tangential[1, i, j] * solver.traction[j]
+        )
+    return change
+
+
+@jit_inline
+def gap_change(solver: Workspace, i: int) -> float:
+    """Change of the gap of pair i by the forces found."""
+    change = 0.0
+    for j in range(solver.force.size):
+        change += solver.matrix[i, j] * solver.force[j] + solver.coupling[i, j] * solver.traction[j]
+    return change
+
+
+@jit_inline_sum
+def expected_states(states: int, crossing: int, work: FrictionWork) -> int:
+    """States that the pairs with a finite gap in `work.solver` are expected in, others open.
+
+    A pair that sticks does so still, one whose slip vanishes begins to, and one that closes slides.
+    """
+    expected = int(np.int64(0))
+    for i in range(work.rate.size):
+        if work.solver.gap[i] < np.inf:
+            state = state_of(states, i)
+            is_stopped = state != OPEN and (crossing >> (2 * i + 1)) & 1 == 1
+            if work.solver.is_sticking[i] or is_stopped or state == STUCK:
+                state = STUCK
+            elif state == OPEN:
+                state = FORWARD if work.solver.slip[i] >= 0.0 else BACKWARD
+            expected |= state << (2 * i)
+    return expected
+
+
+@jit_inline_sum
+def solve_expected(
+    bodies: FrictionBodies, states: int, crossing: int, work: FrictionWork, feeds_none: bool
+) -> int:
+    """As `solve_event`, at the event of switch functions `crossing`; one pivot where it goes as expected."""
+    expected = expected_states(states, crossing, work)
+    if solve_states(bodies, expected, work) and obeys_laws(bodies, expected, work, feeds_none):
+        return 1
+    return int(solve_event(bodies, work, feeds_none))
+
+
+@jit_inline_sum
+def fill_response(bodies: FrictionBodies, states: int, work: FrictionWork) -> None:
+    """Fill `work.rest`: what normal forces, with the friction of pairs that slide, and tractions change."""
+    solver, q = work.solver, work.rate.size
+    for j in range(q):
+        state, rubs = state_of(states, j), 0.0
+        if state in (FORWARD, BACKWARD):
+            rubs = bodies.sliding[j] if state == FORWARD else -bodies.sliding[j]
+        for i in range(q):
+            work.rest[i, j] = solver.matrix[i, j] + rubs * solver.coupling[i, j]
+            work.rest[q + i, j] = solver.tangential[0, i, j] + rubs * solver.tangential[1, i, j]
+            work.rest[i, q + j], work.rest[q + i, q + j] = solver.coupling[i, j], solver.tangential[1, i, j]
+
+
+@jit_inline_sum
+def solve_active_pairs(bodies: FrictionBodies, states: int, work: FrictionWork) -> bool:
+    """Forces of `work.solver` that stop `work.rest_speed` where `work.is_at_rest`; False where none do."""
+    solver, q = work.solver, work.rate.size
+    fill_response(bodies, states, work)
+    if not solve_active(work.rest, work.rest_speed, work.is_at_rest, work.rest_impulse, work.elimination):
+        return False
+    for i in range(q):
+        state = state_of(states, i)
+        solver.force[i], solver.traction[i] = work.rest_impulse[i], work.rest_impulse[q + i]
+        if state in (FORWARD, BACKWARD):
+            sense = 1.0 if state == FORWARD else -1.0
+            solver.traction[i] = sense * bodies.sliding[i] * solver.force[i]
+    return True
+
+
+@jit_inline_sum
+def solve_states(bodies: FrictionBodies, states: int, work: FrictionWork) -> bool:
+    """Forces with which pairs go on in a set of states, gaps at their targets; False where there are none."""
+    solver, q = work.solver, work.rate.size
+    for i in range(q):
+        state = state_of(states, i)
+        work.rest_speed[i], work.rest_speed[q + i] = solver.gap[i] - solver.target[i], solver.slip[i]
+        work.is_at_rest[i], work.is_at_rest[q + i] = state != OPEN, state == STUCK
+    return bool(solve_active_pairs(bodies, states, work))
+
+
+@jit_inline_sum
+def obeys_laws(bodies: FrictionBodies, states: int, work: FrictionWork, feeds_none: bool) -> bool:
+    """Whether the forces found for a set of states clearly obey the laws; fills `solver.cone`, `active`."""
+    solver, q = work.solver, work.rate.size
+    obeys, most = True, 0.0
+    for i in range(q):
+        most = max(most, solver.matrix[i, i] * solver.force[i])
+    for i in range(q):
+        state = state_of(states, i)
+        solver.active[i] = state != OPEN
+        solver.cone[i] = bodies.static[i] if solver.is_sticking[i] else bodies.sliding[i]
+        if state != OPEN:
+            force, traction, slip = solver.force[i], solver.traction[i], solver.slip[i]
+            bound, end = solver.cone[i] * force, slip + slip_change(solver, i)
+            moved = abs(solver.tangential[1, i, i] * traction)
+            obeys = obeys and solver.matrix[i, i] * force > CLEARLY * most
+            if state == STUCK:
+                obeys = obeys and abs(traction) < bound * (1.0 - CLEARLY)
+            else:
+                obeys = obeys and (end if state == FORWARD else -end) > CLEARLY * (abs(slip) + moved)
+            if feeds_none:
+                least = UNNOTICED * abs(solver.tangential[1, i, i]) * bound
+                obeys = obeys and traction * (slip + end) >= -abs(traction) * least
+    return obeys
