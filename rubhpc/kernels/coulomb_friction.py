@@ -25,6 +25,7 @@ Floats = NDArray[np.float64]
 
 ROUNDING = 1e-12  # of a force: smaller ones count as zero
 UNNOTICED = 1e-6  # of the slip that friction can change in a step: less counts as no slip
+LAST_BITS = 2e-15  # of the positions of a pair: their difference, the slip of a step, errs by as much
 
 
 @jit_lean
@@ -90,13 +91,15 @@ def feeds_energy(pairs: Pairs, work: Workspace, i: int, step: float, spin: float
     """Whether the friction of pair i has the direction of the mean slip, so that it adds energy."""
     before = step * pairs.radius[i] * spin
     after = work.slip[i]
+    reach = 0.0
     for a in range(N_DEGREE):
         before -= step * work.friction_direction[i, a] * work.rate[i, a]
+        reach += abs(work.friction_direction[i, a] * work.at[i, a])
     for j in range(work.force.size):
         after += work.tangential[0, i, j] * work.force[j] + work.tangential[1, i, j] * work.traction[j]
     # Relative to the slip that friction can change in a step: a sticking pair slips by the rounding of
     # positions.
-    least = UNNOTICED * abs(work.tangential[1, i, i]) * work.cone[i] * work.force[i]
+    least = UNNOTICED * abs(work.tangential[1, i, i]) * work.cone[i] * work.force[i] + LAST_BITS * reach
     return bool(work.traction[i] * (before + after) < -abs(work.traction[i]) * least)
 
 

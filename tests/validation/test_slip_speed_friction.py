@@ -7,8 +7,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from test_coulomb import PRESSED, pressed_onto_a_rim
 
-from rubhpc import simulate
+from rubhpc import Rig, simulate
 from rubhpc.errors import InputError
+from rubhpc.rig.forces import Load
+from rubhpc.rig.stators import LumpedStator
 from rubhpc.study.contact_keys import Contact
 
 RIM, FRICTION, DURATION = 0.5, 0.2, 1.2  # m/s, 1, s
@@ -85,6 +87,48 @@ def test_stick_and_slip(contact):
     assert len(turns) > 2
     assert np.diff(turns) == pytest.approx(np.full(len(turns) - 1, period), rel=5e-3)
     assert record.stick_fraction[0] > 0.05
+
+
+def test_stick_of_a_slow_cycle_at_the_default_step():
+    """In 0.25 us a slow mass slips by less than the last bits of its position: that is no reversal."""
+    mass, spring, pressed, rim, rest = 0.7, 450.0, 6.0, 0.2, 1.6
+    held = rest * 0.25 * pressed / spring
+
+    def slide(_, state):
+        ratio = 1.0 + (rest - 1.0) * np.exp(-max(rim - state[1], 0.0) / 0.15)
+        return [state[1], (0.25 * ratio * pressed - spring * state[0]) / mass]
+
+    def stopped(time, state):
+        return rim - state[1] if time > 1e-3 else 1.0
+
+    stopped.terminal = True
+    cycle = solve_ivp(slide, (0.0, 2.0), [held, rim - 1e-9], events=stopped, rtol=1e-10, atol=1e-13)
+    stuck = (held - cycle.y[0, -1]) / rim
+    spin = 2 * math.pi / (cycle.t[-1] + stuck)
+    rig = Rig.from_matrices(
+        np.diag([mass, mass]),
+        np.zeros((2, 2)),
+        np.diag([1e4, spring]),
+        degrees=[(1, "v"), (1, "w")],
+        stators=LumpedStator(node=1, rigid=True, radius=rim / spin),
+        load=Load(node=1, vertical=pressed + 1.0),
+    )
+    record = simulate(
+        rig,
+        speed=spin,
+        clearance=1e-4,
+        friction=0.25,
+        friction_law="stribeck",
+        static_friction_ratio=rest,
+        stribeck_speed=0.15,
+        transient=0,
+        revolutions=1,
+        keep=("waveform",),
+        initial={"horizontal": -held, "horizontal_velocity": -0.9999 * rim},
+    )
+    assert record.stick_fraction[0] == pytest.approx(stuck * spin / (2 * math.pi), rel=2e-3)
+    assert record.reversals_per_revolution[0] == 0.0
+    assert abs(record.horizontal).max() == pytest.approx(cycle.y[0].max(), rel=1e-3)
 
 
 def test_limits_are_coulombs_law():
