@@ -84,7 +84,7 @@ def _kept(march: EventDrivenMarch) -> Trail | None:
         trail = _spare.pop()
     except IndexError:
         return None
-    width = trail.begun.shape[2], trail.velocity.shape[1], trail.given.shape[2]
+    width = trail.begun.shape[2], trail.given.shape[2]
     return trail if width == march.width else None
 
 

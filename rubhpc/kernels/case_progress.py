@@ -47,7 +47,6 @@ class Progress(Protocol):
     energy_from: int  # tick from which energies are still to be added, or NONE
     contact_age: int  # level of the contact's duration when its rate of change was last read, or NONE
     resolved_level: int  # of the longest step that resolved the contact then
-    resolved: int  # ticks of that step (set-valued friction)
     halving_level: int  # while halving towards an event: level of the longest step to try; else NONE
     is_after_event: int  # whether the next step is the first one after an event
 

@@ -22,6 +22,7 @@ SAMPLES_AT_ONCE = 8  # read from one set of modal coordinates
 BOUND_LEVEL = 3  # `ModeTables.bound` holds over 2^level samples, or the longest step where that is longer
 FORCED_LEVEL = 6  # steps of up to 2^level ticks after an event need no bound, so that time advances
 RESOLVED = 0.02  # of a signal's size: its fourth derivative times the step to the fourth
+STILL = 1e-3  # 1/s, size of an exponent up to which a coordinate has no primitive
 DYING = -1.0  # pace of a mode that has decayed before the first step after an event ends
 
 
@@ -43,6 +44,10 @@ class ModeTables(NamedTuple):
     bend_re: Floats  # (p, q, m), its second time derivative; under set-valued friction alone, as the next
     bend_im: Floats
     turn: Floats  # (p, q, m), bound on its third time derivative; negative: decays within a sample
+    primitive_re: (
+        Floats  # (p, q, m), its primitive in time, zero of coordinates that have none; where measured
+    )
+    primitive_im: Floats
     pace: Floats  # (p, m), size of the exponent, 1/s, or DYING
     power_re: Floats  # (p, n_level, m), exponential of each mode over 2^level ticks
     power_im: Floats

@@ -54,7 +54,7 @@ from rubhpc.kernels.event_steps import (
     sample_step,
 )
 from rubhpc.kernels.measuring import begin_contact, begin_span, observe_step, resolved_contact
-from rubhpc.kernels.mode_change import change_contacts
+from rubhpc.kernels.mode_change import change_contacts, product
 from rubhpc.kernels.penalty_events import change_pressed
 from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.trail import Trail, no_trail, note_after, note_event, note_piece
@@ -351,7 +351,10 @@ def take_event(
         )
     if progress.wanted < 0 or progress.n_event > MOST_EVENTS:
         return CONTACT_UNSOLVED
-    note_after(work.trail, motion, work.given)
+    if work.trail.tick.size > 0:
+        for i in range(work.speed.size):
+            work.speed[i] = product(reduced.gap_jacobian[i], motion[motion.size // 2 :])
+        note_after(work.trail, work.speed, work.speed, work.given)
     if is_recorded:
         for i in range(reduced.radius.size):
             record_event(clock, progress, work.impulse, i, samples, accumulator)

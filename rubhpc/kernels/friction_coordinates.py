@@ -170,27 +170,17 @@ def work_form(tables: ModeTables, mode: int, z_re: Floats, z_im: Floats) -> floa
 
 
 @jit_inline_sum
-def begin_energies(tables: ModeTables, z: Floats, progress: Progress, recorder: Recorder) -> None:
-    """Begin to add up energies at the tick reached, in the contact mode entered."""
-    for k in range(used_width(tables, progress.mode)):
-        recorder.begun[0, k], recorder.begun[1, k] = z[0, k], z[1, k]
-    progress.energy_from = progress.tick
-
-
-@jit_inline_sum
-def end_energies(
+def add_energies(
     tables: ModeTables,
-    clock: Clock,
+    mode: int,
+    time: float,
+    begun: Floats,
     z: Floats,
-    progress: Progress,
     recorder: Recorder,
     accumulator: Accumulator,
     transitions: Transitions,
 ) -> None:
-    """Add what damping took and the unbalance gave since they began, in one contact mode all along."""
-    mode = progress.mode
-    time = (progress.tick - progress.energy_from) * clock.tick
-    energies_gained(tables, mode, recorder.begun, z, recorder.entry, transitions)
+    """Add what damping took and the unbalance gave over a time (s) in a contact mode."""
+    energies_gained(tables, mode, begun, z, recorder.entry, transitions)
     accumulator.energy[DAMPING_LOSS] += recorder.entry[0] + tables.steady_power[mode, 0] * time
     accumulator.energy[UNBALANCE_WORK] += recorder.entry[1] + tables.steady_power[mode, 1] * time
-    progress.energy_from = NONE

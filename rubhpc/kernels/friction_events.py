@@ -52,15 +52,6 @@ def takes_part(states: int, crossing: int, i: int) -> bool:
 
 
 @jit_inline_sum
-def touches(states: int, crossing: int, q: int) -> bool:
-    """Whether the gap of an open pair closes."""
-    found = False
-    for i in range(q):
-        found = found or (state_of(states, i) == OPEN and (crossing >> (2 * i)) & 1 == 1)
-    return found
-
-
-@jit_inline_sum
 def see_pairs(
     reduced: Reduced, bodies: FrictionBodies, states: int, crossing: int, motion: Floats, work: FrictionWork
 ) -> None:
@@ -216,6 +207,9 @@ def bring_to_rest(
     if is_recorded:
         observe_impacts(bodies, work, accumulator)
     give_impulses(reduced, work)
+    for i in range(q):
+        work.rate[i] += gap_change(work.solver, i)
+        work.slip[i] += slip_change(work.solver, i)
 
 
 @jit_lean

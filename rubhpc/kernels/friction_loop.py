@@ -29,11 +29,12 @@ from rubhpc.kernels.coordinate_steps import go_on, leading_level, turn_on
 from rubhpc.kernels.event_bounds import free_until
 from rubhpc.kernels.event_forces import FrictionWork  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.event_search import approach_change, find_change, move_stuck
-from rubhpc.kernels.event_steps import choose_step, contact_age, end_samples, longest_step, sample_step
-from rubhpc.kernels.friction_coordinates import begin_energies, end_energies, enter_states, used_width
+from rubhpc.kernels.event_steps import choose_step, end_samples
+from rubhpc.kernels.friction_coordinates import enter_states, used_width
 from rubhpc.kernels.friction_events import observe_states
-from rubhpc.kernels.friction_measuring import begin_friction, observe_friction, resolved_friction
+from rubhpc.kernels.friction_measuring import observe_spans
 from rubhpc.kernels.friction_passage import take_change
+from rubhpc.kernels.friction_spans import LONGEST, begin_span, has_room, note_span
 from rubhpc.kernels.friction_states import FrictionBodies, stuck_pairs
 from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.trail import note_piece
@@ -83,14 +84,20 @@ def advance_with_friction(
     bend_re, bend_im, turn = tables.bend_re, tables.bend_im, tables.turn
     power_re, power_im, n_eigenmode = tables.power_re, tables.power_im, tables.n_eigenmode
     rim_speed = bodies.rim_speed
-    interval, overlap = clock.tick * (1 << clock.sample_level), reduced.overlap
+    overlap = reduced.overlap
     highest_level = power_re.shape[1] - 1
+    if is_recorded:  # spans have room for some samples
+        highest_level = min(highest_level, clock.sample_level + leading_level(LONGEST))
     last_step = progress.n_step + MOST_STEPS
     progress.halving_level, progress.is_after_event = NONE, 0
     is_new = True  # the contact mode, to this call
     while True:
         if progress.wanted >= 0:
             if not enter_states(tables, reduced.clearance, clock, progress, motion, z):
+                if is_recorded:
+                    observe_spans(
+                        tables, bodies, clock, progress, recorder, samples, accumulator, transitions
+                    )
                 return MODE_WANTED
             note_piece(work.trail, mask[progress.mode], z)
             is_new = True
@@ -103,130 +110,114 @@ def advance_with_friction(
             used = used_width(tables, progress.mode)
             z_re, z_im, next_re, next_im = z[0, :used], z[1, :used], z_next[0, :used], z_next[1, :used]
             if is_recorded:
-                if progress.energy_from < 0:
-                    begin_energies(tables, z, progress, recorder)
-                begin_friction(tables, bodies, progress.mode, z, z_next, recorder)
                 observe_states(mask[progress.mode], accumulator)
-        is_sample = is_recorded and progress.tick == progress.next_sample << clock.sample_level
-        if progress.tick >= last_tick:
-            if is_recorded and end_samples(
-                tables, clock, is_sample, z, progress, recorder, samples, accumulator
-            ):
-                end_energies(tables, clock, z, progress, recorder, accumulator, transitions)
+        if is_recorded and progress.energy_from < 0:
+            begin_span(recorder.spans, z)
+            progress.energy_from = progress.tick
+        is_over, crossing = progress.tick >= last_tick, int(np.int64(0))
+        if not is_over:
+            is_at_event = progress.is_after_event == 1 or progress.halving_level >= 0
+            if progress.n_step > last_step and not is_at_event:
+                if is_recorded:
+                    observe_spans(
+                        tables, bodies, clock, progress, recorder, samples, accumulator, transitions
+                    )
+                return PAUSED
+            mode = progress.mode
+            states = mask[mode]
+            longest, left = highest_level, last_tick - progress.tick
+            if left < 1 << highest_level:
+                longest = leading_level(left)
+            if not is_at_event and progress.tick >= renewed_at and progress.tick + (1 << longest) > sure_to:
+                free_to, sure_to = free_until(
+                    states,
+                    mode,
+                    switch_re,
+                    switch_im,
+                    rate_re,
+                    rate_im,
+                    bend_re,
+                    bend_im,
+                    turn,
+                    z_re,
+                    z_im,
+                    progress.tick,
+                    clock.tick,
+                    1 << clock.search_level,
+                    1 << highest_level,
+                    work.free_until,
+                )
+                renewed_at = sure_to - (sure_to - progress.tick) // WORTH_ASKING
+            is_forced = progress.is_after_event == 1
+            if is_at_event:
+                level, _ = choose_step(clock, progress, longest, (sure_to - progress.tick) * clock.tick)
+                count = 1 << level
+            else:
+                reach = min(sure_to - progress.tick, left, 1 << highest_level)
+                count = max(leading(reach), 1 << min(longest, clock.search_level))
+                level = leading_level(count)
+            step, ends = count * clock.tick, progress.tick + count
+            progress.n_step += 1
+            is_checked = not is_forced and ends > free_to
+            if is_checked:
+                go_on(count, power_re[mode], power_im[mode], z_re, z_im, next_re, next_im)
+                if stuck_pairs(states) != 0:
+                    move_stuck(states, n_eigenmode[mode], rim_speed, step, next_re)
+                crossing = find_change(
+                    states,
+                    mode,
+                    switch_re,
+                    switch_im,
+                    next_re,
+                    next_im,
+                    rate_re,
+                    rate_im,
+                    overlap,
+                    ends,
+                    work.free_until,
+                )
+                if crossing != 0 and level > clock.sample_level:
+                    progress.halving_level = level - 1
+                    continue
+            passed = count
+            if crossing != 0:
+                passed, crossing = approach_change(
+                    tables,
+                    bodies,
+                    clock,
+                    mode,
+                    crossing,
+                    overlap,
+                    count,
+                    z,
+                    z_next,
+                    progress.tick,
+                    work.free_until,
+                )
+            elif is_checked:
+                for k in range(z_re.size):
+                    z_re[k], z_im[k] = next_re[k], next_im[k]
+            else:
+                turn_on(count, power_re[mode], power_im[mode], z_re, z_im)
+                if stuck_pairs(states) != 0:
+                    move_stuck(states, n_eigenmode[mode], rim_speed, step, z_re)
+            progress.tick += passed
+            progress.halving_level = max(progress.halving_level - 1, NONE)
+        if is_recorded:
+            n_sample = (progress.tick >> clock.sample_level) - (progress.energy_from >> clock.sample_level)
+            if is_over or crossing != 0 or n_sample >= LONGEST:
+                if not has_room(recorder.spans, n_sample + 1):
+                    observe_spans(
+                        tables, bodies, clock, progress, recorder, samples, accumulator, transitions
+                    )
+                begin, progress.energy_from = progress.energy_from, NONE
+                note_span(recorder.spans, progress.mode, begin, progress.tick, n_sample + 1, z)
+        if is_over:
+            if is_recorded:
+                observe_spans(tables, bodies, clock, progress, recorder, samples, accumulator, transitions)
+                is_sample = progress.tick == progress.next_sample << clock.sample_level
+                end_samples(tables, clock, is_sample, z, progress, recorder, samples, accumulator)
             return FINISHED
-        is_at_event = progress.is_after_event == 1 or progress.halving_level >= 0
-        if progress.n_step > last_step and not is_at_event:
-            return PAUSED
-        mode = progress.mode
-        states = mask[mode]
-        is_ahead = is_sample and states == 0
-        longest, left = highest_level, last_tick - progress.tick
-        if is_recorded or left < 1 << highest_level:
-            longest = longest_step(clock, last_tick, highest_level, is_recorded, is_ahead, progress.tick)
-        is_measured, finest = is_recorded and states != 0, 1 << clock.sample_level
-        if is_measured and progress.tick > progress.entered:
-            age = contact_age(progress)
-            if age != progress.contact_age:
-                since = (progress.tick - progress.entered) * clock.tick
-                resolved = resolved_friction(tables, mode, since, z_re, z_im)
-                progress.contact_age = age
-                progress.resolved = int(max(1.0, min(resolved / clock.tick, 1.0 * finest)))
-            finest = min(finest, progress.resolved)
-            longest = min(longest, leading_level(finest))
-        if not is_at_event and progress.tick >= renewed_at and progress.tick + (1 << longest) > sure_to:
-            free_to, sure_to = free_until(
-                states,
-                mode,
-                switch_re,
-                switch_im,
-                rate_re,
-                rate_im,
-                bend_re,
-                bend_im,
-                turn,
-                z_re,
-                z_im,
-                progress.tick,
-                clock.tick,
-                1 << clock.search_level,
-                1 << highest_level,
-                work.free_until,
-            )
-            renewed_at = sure_to - (sure_to - progress.tick) // WORTH_ASKING
-        is_forced = progress.is_after_event == 1
-        if is_recorded or is_at_event:
-            level, _ = choose_step(clock, progress, longest, (sure_to - progress.tick) * clock.tick)
-            count = 1 << level
-            if is_measured and not is_at_event:
-                count = measured_step(clock, last_tick, finest, sure_to, progress)
-        else:
-            reach = min(sure_to - progress.tick, left, 1 << highest_level)
-            count = max(leading(reach), 1 << min(longest, clock.search_level))
-            level = leading_level(count)
-        step, ends = count * clock.tick, progress.tick + count
-        progress.n_step += 1
-        is_checked, crossing = not is_forced and ends > free_to, int(np.int64(0))
-        if is_checked:
-            go_on(count, power_re[mode], power_im[mode], z_re, z_im, next_re, next_im)
-            if stuck_pairs(states) != 0:
-                move_stuck(states, n_eigenmode[mode], rim_speed, step, next_re)
-            crossing = find_change(
-                states,
-                mode,
-                switch_re,
-                switch_im,
-                next_re,
-                next_im,
-                rate_re,
-                rate_im,
-                overlap,
-                ends,
-                work.free_until,
-            )
-            if crossing != 0 and level > clock.sample_level:
-                progress.halving_level = level - 1
-                continue
-        if is_sample:
-            sample_step(tables, clock, level, z[0], z[1], progress, recorder, samples, accumulator)
-        passed = count
-        if crossing != 0:
-            passed, crossing = approach_change(
-                tables,
-                bodies,
-                clock,
-                mode,
-                crossing,
-                overlap,
-                count,
-                z,
-                z_next,
-                progress.tick,
-                work.free_until,
-            )
-        elif is_checked:
-            for k in range(z_re.size):
-                z_re[k], z_im[k] = next_re[k], next_im[k]
-        else:
-            turn_on(count, power_re[mode], power_im[mode], z_re, z_im)
-            if stuck_pairs(states) != 0:
-                move_stuck(states, n_eigenmode[mode], rim_speed, step, z_re)
-        if is_recorded and states != 0 and passed > 0:
-            observe_friction(
-                tables,
-                bodies,
-                mode,
-                progress.tick * clock.tick,
-                passed * clock.tick,
-                z_re,
-                z_im,
-                progress.tick >> clock.sample_level,
-                1.0 / interval,
-                recorder,
-                samples,
-                accumulator,
-            )
-        progress.tick += passed
-        progress.halving_level = max(progress.halving_level - 1, NONE)
         if crossing != 0:  # within the next tick
             outcome = take_change(
                 tables,
@@ -246,6 +237,10 @@ def advance_with_friction(
                 transitions,
             )
             if outcome != UNDER_WAY:
+                if is_recorded:
+                    observe_spans(
+                        tables, bodies, clock, progress, recorder, samples, accumulator, transitions
+                    )
                 return outcome
             if progress.wanted < 0:
                 note_piece(work.trail, mask[progress.mode], z)
@@ -257,21 +252,3 @@ def leading(count: int) -> int:
     """The count of ticks less all but its first bits; 0 of none."""
     unit = 1 << max(leading_level(max(count, 1)) - FEW_BITS, 0)
     return int(max(count, 0) // unit * unit)
-
-
-@jit_inline_sum
-def measured_step(clock: Clock, last_tick: int, finest: int, sure_to: int, progress: Progress) -> int:
-    """Ticks of the next step of a closed pair that is recorded: on to the next sample in equal steps.
-
-    None is longer than `finest` ticks, nor, but for a search for events, ends after the tick `sure_to`. They
-    are taken by powers of two of ticks, and so counts of few digits are chosen.
-    """
-    now = progress.tick
-    next_sample = ((now >> clock.sample_level) + 1) << clock.sample_level
-    ahead = min(last_tick, next_sample) - now
-    most = min(finest, max(sure_to - now, 1 << clock.search_level))
-    n_step = (ahead + most - 1) // most
-    count = (ahead + n_step - 1) // n_step
-    unit = max(1, (1 << leading_level(finest)) >> FEW_BITS)
-    whole = (count + unit - 1) // unit * unit
-    return min(ahead, whole if whole <= most else max(most // unit * unit, count % unit))

@@ -1,158 +1,199 @@
-"""What is measured of pairs under set-valued friction as a case goes from event to event."""
+"""What is measured of spans between events under set-valued friction, contact mode by contact mode.
+
+A span is one linear piece of a motion, so that nothing is measured step by step.
+"""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
-from rubhpc.kernels._jit import jit_inline_sum
+from rubhpc.kernels._jit import jit_inline_sum, jit_part_sum
 from rubhpc.kernels.accumulators import DAMPING_LOSS, observe_force, observe_rub
-from rubhpc.kernels.contact_modes import DYING, RESOLVED, ModeTables
-from rubhpc.kernels.cubics import turning_value
-from rubhpc.kernels.force_average import AVERAGING_TIME
+from rubhpc.kernels.case_progress import Clock, Progress  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE, ModeTables
+from rubhpc.kernels.event_search import move_ticks
+from rubhpc.kernels.friction_coordinates import add_energies
+from rubhpc.kernels.friction_spans import (
+    AFTER,
+    BEFORE,
+    FRICTION,
+    IMPULSE,
+    MOST,
+    copy_coordinates,
+    forget_spans,
+)
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, FrictionBodies, state_of
-from rubhpc.kernels.measuring import FORCE, FORCE_RATE, SLIP, SLIP_RATE, force_in_step, leave_out_dying
-from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.friction_work import rub_through
+from rubhpc.kernels.peak_search import follow_force
+from rubhpc.kernels.sampling import Recorder, read_samples, widen_extrema
+from rubhpc.kernels.span_forces import begin_force, pass_force
+from rubhpc.kernels.transitions import Transitions  # noqa: TC001 - part of a kernel's signature
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
 
-Floats = NDArray[np.float64]
 
-# Of the averaging time: until that age of a contact, steps may miss more of what lasts for a shorter time.
-SETTLED = 0.125
-
-
-@jit_inline_sum
-def read_friction(
-    tables: ModeTables, bodies: FrictionBodies, mode: int, i: int, z_re: Floats, z_im: Floats
-) -> tuple[float, float, float, float]:
-    """Normal force (N) of closed pair i, its rate, slip speed (m/s) and its rate.
-
-    Where the pair sticks, the last two are its friction (N) and its rate.
-    """
-    re, im = tables.switch_re[mode], tables.switch_im[mode]
-    turning_re, turning_im = tables.rate_re[mode], tables.rate_im[mode]
-    first, second = 2 * i, 2 * i + 1
-    a, b, a_rate, b_rate = 0.0, 0.0, 0.0, 0.0
-    for k in range(z_re.size):  # in one loop: four would wait for their sums four times
-        x, y = z_re[k], z_im[k]
-        a += re[first, k] * x - im[first, k] * y
-        b += re[second, k] * x - im[second, k] * y
-        a_rate += turning_re[first, k] * x - turning_im[first, k] * y
-        b_rate += turning_re[second, k] * x - turning_im[second, k] * y
-    state = state_of(tables.mask[mode], i)
-    if state == STUCK:
-        share = 0.5 / bodies.static[i]
-        return share * (a + b), share * (a_rate + b_rate), 0.5 * (b - a), 0.5 * (b_rate - a_rate)
-    sense = -1.0 if state == BACKWARD else 1.0
-    return a, a_rate, sense * b, sense * b_rate
-
-
-@jit_inline_sum
-def resolved_friction(tables: ModeTables, mode: int, age: float, z_re: Floats, z_im: Floats) -> float:
-    """Time, s, over which cubics follow the switch functions of the pairs closed in contact mode `mode`.
-
-    As `contact_modes.resolved_time`, but for what an event has set off less than a share of the averaging
-    time ago: of that, impulses and works are asked for, not values, and the shorter the `age` (s) of the
-    contact, the less of them can be missed. Sizes are bounded by those of real and imaginary parts.
-    """
-    fourth, pace = np.inf, tables.pace[mode]
-    for i in range(tables.switch_re.shape[1] // 2):
-        state = state_of(tables.mask[mode], i)
-        if state == OPEN:
-            continue
-        for j in range(2 * i, 2 * i + 2):
-            # Of the slip, but for that of the steady spin.
-            least = DYING if state == STUCK or j == 2 * i else 0.0
-            re, im = tables.switch_re[mode, j], tables.switch_im[mode, j]
-            whole, bend = 0.0, 0.0
-            for k in range(z_re.size):
-                if pace[k] > least:
-                    part = (abs(re[k]) + abs(im[k])) * (abs(z_re[k]) + abs(z_im[k]))
-                    square = pace[k] * pace[k]
-                    whole += part
-                    bend += part * square * square
-            if bend > 0.0:
-                fourth = min(fourth, whole / bend)
-    spared = max(1.0, SETTLED * AVERAGING_TIME / age)
-    return float(np.sqrt(np.sqrt(RESOLVED * spared * fourth)))
-
-
-@jit_inline_sum
-def begin_friction(
-    tables: ModeTables, bodies: FrictionBodies, mode: int, z: Floats, calm: Floats, recorder: Recorder
-) -> None:
-    """Read the closed pairs in contact mode `mode`, at its beginning or where a record begins.
-
-    `calm` (2, m) is work space.
-    """
-    leave_out_dying(tables.pace[mode], z, calm)
-    for i in range(bodies.rim_speed.size):
-        if state_of(tables.mask[mode], i) != OPEN:
-            force, rate, across, across_rate = read_friction(tables, bodies, mode, i, calm[0], calm[1])
-            recorder.node[FORCE, i], recorder.node[FORCE_RATE, i] = force, rate
-            recorder.node[SLIP, i], recorder.node[SLIP_RATE, i] = across, across_rate
-
-
-@jit_inline_sum
-def observe_friction(
+@jit_part_sum
+def observe_spans(
     tables: ModeTables,
     bodies: FrictionBodies,
-    mode: int,
-    begin: float,
-    step: float,
-    z_re: Floats,
-    z_im: Floats,
-    i_sample: int,
-    share: float,
+    clock: Clock,
+    progress: Progress,
     recorder: Recorder,
     samples: Samples,
     accumulator: Accumulator,
+    transitions: Transitions,
 ) -> None:
-    """Add a step (s) of the closed pairs: forces and slip as cubics, Simpson's rule for friction.
+    """Measure the spans that are kept: samples, energies, forces and friction, and make room for others."""
+    spans = recorder.spans
+    n_span, level, n_part, first_sample = spans.noted[0], clock.sample_level, 0, progress.next_sample
+    for s in range(n_span):
+        spans.first[s] = n_part
+        begin, end = spans.tick[s, 0], spans.tick[s, 1]
+        n_part += ((end - 1) >> level) - (begin >> level) + 1 if end > begin else 0
+    spans.first[n_span] = n_part
+    for first in range(n_span):
+        mode = spans.mode[first]
+        if mode < 0:
+            continue
+        for s in range(first, n_span):
+            if spans.mode[s] == mode:
+                observe_span(
+                    tables, bodies, clock, s, first_sample, recorder, samples, accumulator, transitions
+                )
+                spans.mode[s] = -1 - mode
+    if n_span > 0:
+        last = spans.tick[n_span - 1, 1]
+        progress.next_sample = max(first_sample, ((last - 1) >> level) + 1)
+    watch_samples(clock, progress.next_sample - first_sample, recorder, accumulator)
+    for s in range(n_span):
+        mode = -1 - spans.mode[s]
+        now, end, states = spans.tick[s, 0], spans.tick[s, 1], tables.mask[mode]
+        for part in range(spans.first[s], spans.first[s + 1]):
+            stop = min(end, ((now >> level) + 1) << level)
+            for i in range(bodies.rim_speed.size):
+                if state_of(states, i) == OPEN:
+                    continue
+                force = spans.force[part, i]
+                if force[MOST] > accumulator.peak_force[i]:
+                    follow_force(tables, bodies, clock, mode, s, i, now, stop, recorder, accumulator)
+                else:
+                    time = (stop - now) * clock.tick
+                    begin = now * clock.tick
+                    observe_force(i, begin, time, force[IMPULSE], force[BEFORE], force[AFTER], accumulator)
+            now = stop
+        for i in range(bodies.rim_speed.size):
+            if spans.given[s, i] != 0.0:
+                observe_force(i, end * clock.tick, 0.0, spans.given[s, i], 0.0, 0.0, accumulator)
+    forget_spans(spans)
 
-    Times, shares and energies as in `measuring.observe_step`.
+
+@jit_inline_sum
+def watch_samples(clock: Clock, n_sample: int, recorder: Recorder, accumulator: Accumulator) -> None:
+    """Widen the extrema by the samples of the spans."""
+    n_row, interval = recorder.value.size // SAMPLES_AT_ONCE, clock.tick * (1 << clock.sample_level)
+    for first in range(0, n_sample, SAMPLES_AT_ONCE):
+        widen_extrema(
+            recorder.spans.value[first * n_row : (first + SAMPLES_AT_ONCE) * n_row],
+            min(SAMPLES_AT_ONCE, n_sample - first),
+            interval,
+            recorder.last,
+            accumulator.lowest,
+            accumulator.highest,
+            accumulator.peak_lateral,
+        )
+
+
+@jit_inline_sum
+def observe_span(
+    tables: ModeTables,
+    bodies: FrictionBodies,
+    clock: Clock,
+    s: int,
+    first_sample: int,
+    recorder: Recorder,
+    samples: Samples,
+    accumulator: Accumulator,
+    transitions: Transitions,
+) -> None:
+    """Measure span s, in one contact mode all along; `first_sample` is the first one of all spans.
+
+    Of drive and friction together `add_energies` knows the work in closed form, and counts it with the
+    damping: what is added to them here is taken off there.
     """
+    spans, level = recorder.spans, clock.sample_level
+    mode, begin, end = spans.mode[s], spans.tick[s, 0], spans.tick[s, 1]
+    states, n_row = tables.mask[mode], recorder.value.size // SAMPLES_AT_ONCE
+    time, interval = (end - begin) * clock.tick, clock.tick * (1 << level)
+    add_energies(tables, mode, time, spans.begun[s], spans.ended[s], recorder, accumulator, transitions)
+    here, spare, at_once = spans.path[0], spans.path[1], 1
+    copy_coordinates(spans.begun[s], here)
+    copy_coordinates(here, spare)
+    if states == 0:
+        at_once = min(SAMPLES_AT_ONCE, max(1, (1 << (tables.power_re.shape[1] - 1)) >> level))
+    else:
+        for i in range(bodies.rim_speed.size):
+            if state_of(states, i) != OPEN:
+                begin_force(tables, bodies, mode, i, time, min(time, interval), here, spans.pair[i])
+    now, part = begin, spans.first[s]
+    while now < end:
+        following = (now >> level) + 1
+        if now == (now >> level) << level and now >> level >= first_sample:
+            sample = now >> level
+            count = min(at_once, ((end - 1) >> level) + 1 - sample)
+            read_samples(
+                tables.output,
+                mode,
+                here[0],
+                here[1],
+                sample,
+                count,
+                recorder.value,
+                samples.rotor,
+                samples.axial,
+                samples.lateral,
+                samples.probe,
+            )
+            place, following = (sample - first_sample) * n_row, sample + count
+            for k in range(count * n_row):
+                spans.value[place + k] = recorder.value[k]
+        stop = min(end, following << level)
+        there = spare
+        if stop == end:
+            there = spans.ended[s]
+        else:
+            move_ticks(tables, bodies, mode, stop - now, clock.tick, here, spare)
+        if states != 0:
+            since, until = (now - begin) * clock.tick, (stop - begin) * clock.tick
+            for i in range(bodies.rim_speed.size):
+                state = state_of(states, i)
+                if state == OPEN:
+                    continue
+                pair, force, is_last = spans.pair[i], spans.force[part, i], stop == end
+                pass_force(tables, bodies, mode, i, since, until, is_last, there, pair, force)
+                samples.force[i, now >> level] += force[IMPULSE] / interval
+                accumulator.impulse[i] += force[IMPULSE]
+        here, spare, now, part = there, here, stop, part + 1
+    if states == 0 or time == 0.0:
+        return
     for i in range(bodies.rim_speed.size):
-        state = state_of(tables.mask[mode], i)
+        state = state_of(states, i)
         if state == OPEN:
             continue
-        before, rate_before = recorder.node[FORCE, i], recorder.node[FORCE_RATE, i]
-        across_before, across_rate_before = recorder.node[SLIP, i], recorder.node[SLIP_RATE, i]
-        after, rate_after, across_after, across_rate_after = read_friction(
-            tables, bodies, mode, i, z_re, z_im
-        )
-        recorder.node[FORCE, i], recorder.node[FORCE_RATE, i] = after, rate_after
-        recorder.node[SLIP, i], recorder.node[SLIP_RATE, i] = across_after, across_rate_after
-        impulse, middle = force_in_step(before, rate_before, after, rate_after, step)
-        samples.force[i, i_sample] += impulse * share
-        accumulator.contact_time[i] += step
-        accumulator.impulse[i] += impulse
-        observe_force(i, begin, step, impulse, before, after, accumulator)
-        across_bend = step * (across_rate_before - across_rate_after)
-        friction_work = 0.0
+        accumulator.contact_time[i] += time
         if state == STUCK:
-            rubbed = step * (0.5 * (across_before + across_after) + across_bend / 12.0)
-            accumulator.stick_time[i] += step
+            accumulator.stick_time[i] += time
             accumulator.least_slip[i] = min(accumulator.least_slip[i], 0.0)
+            drive, friction_work = bodies.rim_speed[i] * spans.pair[i, FRICTION], 0.0
         else:
             sense = -1.0 if state == BACKWARD else 1.0
-            rubbed = sense * bodies.sliding[i] * impulse
-            across_middle = 0.5 * (across_before + across_after) + 0.125 * across_bend
-            work = before * across_before + 4.0 * middle * across_middle + after * across_after
-            friction_work = sense * bodies.sliding[i] * work * step / 6.0
+            impulse, work, least, most = rub_through(
+                tables, bodies, clock, mode, i, end - begin, spans.begun[s], spans.ended[s], spans.path
+            )
+            friction_work = bodies.sliding[i] * work
+            drive = sense * bodies.sliding[i] * bodies.rim_speed[i] * impulse
+            slip = max(least, 0.0) if state == FORWARD else -most
+            accumulator.least_slip[i] = min(accumulator.least_slip[i], slip)
             accumulator.friction_work[i] += friction_work
-            least = min(across_before, across_after)
-            if across_rate_before < 0.0 and across_rate_after > 0.0:
-                least = turning_value(
-                    across_before, across_rate_before, across_after, across_rate_after, step
-                )
-            if state == FORWARD:
-                least = max(least, 0.0)
-            accumulator.least_slip[i] = min(accumulator.least_slip[i], least)
-        drive = bodies.rim_speed[i] * rubbed
         observe_rub(drive, friction_work, accumulator)
         accumulator.energy[DAMPING_LOSS] += drive - friction_work

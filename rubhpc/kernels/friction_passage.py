@@ -20,10 +20,11 @@ from rubhpc.kernels.case_progress import (
 )
 from rubhpc.kernels.contact_modes import FORCED_LEVEL, ModeTables, Reduced, find_mode, is_beyond
 from rubhpc.kernels.event_forces import FrictionWork  # noqa: TC001 - part of a kernel's signature
-from rubhpc.kernels.event_steps import count_event, record_event, record_touch
+from rubhpc.kernels.event_steps import count_event, record_touch
 from rubhpc.kernels.friction_change import change_seen
-from rubhpc.kernels.friction_coordinates import begin_states, end_energies, leave_states, used_width
-from rubhpc.kernels.friction_events import add_kick, see_pairs, takes_part, touches
+from rubhpc.kernels.friction_coordinates import begin_states, leave_states, used_width
+from rubhpc.kernels.friction_events import add_kick, see_pairs, takes_part
+from rubhpc.kernels.friction_spans import note_impulse
 from rubhpc.kernels.friction_states import OPEN, FrictionBodies, state_of
 from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.trail import note_after, note_event
@@ -77,6 +78,7 @@ def take_change(
     states, m, used = tables.mask[mode], z.shape[1], used_width(tables, mode)
     is_known = transitions.mode.size > 0 and transitions.mode[mode] >= 0
     count_event(clock, progress)
+    interval = clock.tick * (1 << clock.sample_level)
     (cosine, sine), moment = shaft_turn(clock, progress.tick), (1 << FORCED_LEVEL) * clock.tick
     if is_known:
         first = tables.n_eigenmode[mode]
@@ -94,7 +96,6 @@ def take_change(
         if not is_known:
             see_pairs(reduced, bodies, states, crossing, motion, work)
     if is_recorded:
-        end_energies(tables, clock, z, progress, recorder, accumulator, transitions)
         for i in range(q):
             work.impulse[i] = accumulator.impulse[i]
     wanted = change_seen(
@@ -112,7 +113,9 @@ def take_change(
     )
     if is_recorded:
         for i in range(q):
-            record_event(clock, progress, work.impulse, i, samples, accumulator)
+            gained = accumulator.impulse[i] - work.impulse[i]
+            samples.force[i, progress.tick >> clock.sample_level] += gained / interval
+            note_impulse(recorder.spans, i, gained)
             if wanted >= 0:
                 record_touch(i, state_of(wanted, i) != OPEN, accumulator)
     following, passed = NONE, UNKNOWN
@@ -124,15 +127,13 @@ def take_change(
                 passed -= 1
                 transitions.entry[mode, following] = passed
     is_unsolved = wanted < 0 or progress.n_event > MOST_EVENTS
-    # The tangent reads the velocities of a trail where a gap closes.
-    is_read = passed < 0 or is_unsolved or (work.trail.tick.size > 0 and touches(states, crossing, q))
-    if is_read and not is_left:
+    if (passed < 0 or is_unsolved) and not is_left:
         leave_states(tables, mode, z, motion)
     note_event(work.trail, progress.tick, crossing)
     add_kick(work, motion)
     if is_unsolved:
         return CONTACT_UNSOLVED
-    note_after(work.trail, motion, work.given)
+    note_after(work.trail, work.rate, work.slip, work.given)
     if passed < 0:
         progress.wanted = wanted
         return MODE_WANTED if passed == UNKNOWN - WORTH_A_TABLE else UNDER_WAY

@@ -16,6 +16,7 @@ from rubhpc.kernels.contact_modes import (
     DYING,
     FORCED_LEVEL,
     SAMPLES_AT_ONCE,
+    STILL,
     ModeTables,
 )
 from rubhpc.kernels.retuning_laws import RimPart, Springs, follow_growth, move_rim, stretch_springs
@@ -139,6 +140,9 @@ def retune_to(
         for a in range(2 * n):
             switch += held.switch[i, a] * x[a]
         tables.switch_re[mode, i, m], tables.switch_im[mode, i, m] = switch.real, switch.imag
+        if i < tables.primitive_re.shape[1]:
+            whole = switch / turning if abs(turning) > STILL else 0j
+            tables.primitive_re[mode, i, m], tables.primitive_im[mode, i, m] = whole.real, whole.imag
         switch = switch * turning
         tables.rate_re[mode, i, m], tables.rate_im[mode, i, m] = switch.real, switch.imag
         if i < tables.bend_re.shape[1]:

@@ -168,7 +168,7 @@ def carry_along(
             if strikes:
                 for i in range(q):
                     tangent.rate[0, i], tangent.rate[1, i], _, _ = see(transitions, place, m, i, m, d)
-                strike(reduced, True, trail.given[k], trail.velocity[k], tangent)
+                strike(reduced, True, trail.given[k], trail.rate[k], tangent)
             pass_over(transitions, passed, m, d, z)
             if strikes:
                 add_impulses(transitions, next_place, q, m, tangent.given, z)
@@ -177,7 +177,7 @@ def carry_along(
         else:
             read_displacement(tables, place, tangent)
             if strikes:
-                strike_motion(reduced, modes.has_states, trail.given[k], trail.velocity[k], tangent)
+                strike_motion(reduced, modes.has_states, trail.given[k], trail.rate[k], tangent)
             enter_displacement(tables, next_place, cosine_rate, sine_rate, tangent)
         if shift != 0.0:
             read_begun(trail, k + 1, z)
@@ -253,7 +253,7 @@ def size_of(motion: Floats, spin: float) -> float:
 
 @jit_lean_sum
 def strike_motion(
-    reduced: Reduced, has_states: bool, impulse: Floats, velocity: Floats, tangent: Tangent
+    reduced: Reduced, has_states: bool, impulse: Floats, rate: Floats, tangent: Tangent
 ) -> None:
     """Apply the derivative of an impact, from `strike`, to `tangent.motion`."""
     q, n = reduced.gap_jacobian.shape
@@ -261,7 +261,7 @@ def strike_motion(
     for i in range(q):
         tangent.rate[0, i] = product(reduced.gap_jacobian[i], moved)
         tangent.rate[1, i] = product(reduced.slip[i], moved)
-    strike(reduced, has_states, impulse, velocity, tangent)
+    strike(reduced, has_states, impulse, rate, tangent)
     for i in range(q):
         given, along_slip = tangent.given[0, i], tangent.given[1, i]
         for k in range(n):
@@ -272,13 +272,13 @@ def strike_motion(
 
 
 @jit_lean_sum
-def strike(reduced: Reduced, has_states: bool, impulse: Floats, velocity: Floats, tangent: Tangent) -> None:
+def strike(reduced: Reduced, has_states: bool, impulse: Floats, rate: Floats, tangent: Tangent) -> None:
     """Fill `tangent.given` with the impulses of the derivative of an impact: `dv+ = dv- - F (R F)^-1 R dv-`.
 
     The rows R are those of the gap velocities that impulses change, each times 1 + restitution where the pair
     parts, and of the slips that they stop. F are the directions of these impulses, including proportional
-    friction. `impulse` (2, q) are the normal and tangential impulses, `velocity` (n,) is the velocity after
-    the impact, and `tangent.rate` the change of gap rates and slips by the displacement.
+    friction. `impulse` (2, q) are the normal and tangential impulses, `rate` (2, q) are gap rates and slips
+    after the impact, and `tangent.rate` the change of gap rates and slips by the displacement.
     """
     q, active, share = reduced.radius.size, tangent.active, tangent.share
     tangent.given[:] = 0.0
@@ -292,12 +292,11 @@ def strike(reduced: Reduced, has_states: bool, impulse: Floats, velocity: Floats
         active[i] = impulse[0, i] > NO_IMPULSE * largest
         share[i] = 0.0
         if active[i]:
-            parts = abs(product(reduced.gap_jacobian[i], velocity)) > AT_REST
+            parts = abs(rate[0, i]) > AT_REST
             scale = 1.0 + reduced.restitution if parts else 1.0
             tangent.speed[i] = scale * tangent.rate[0, i]
             if has_states:
-                slip = reduced.rim_speed[i] + product(reduced.slip[i], velocity)
-                if abs(slip) <= STOPPED * reduced.rim_speed[i]:
+                if abs(rate[1, i]) <= STOPPED * reduced.rim_speed[i]:
                     active[q + i] = True
                     tangent.speed[q + i] = tangent.rate[1, i]
                 else:

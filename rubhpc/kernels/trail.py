@@ -18,7 +18,7 @@ BROKEN = -1  # instead of the number of events: there was no room for all, or sh
 
 
 class Trail(NamedTuple):
-    """Pieces of a motion; m modal coordinates, n reduced degrees, q pairs. Without room none are stored.
+    """Pieces of a motion; m modal coordinates, q pairs. Without room none are stored.
 
     Piece k + 1 begins where event k ends piece k.
     """
@@ -28,29 +28,29 @@ class Trail(NamedTuple):
     tick: Ints  # (room,), of each event
     crossing: Ints  # (room,), bits of the switch functions that vanish there
     begun: Floats  # (room + 1, 2, m), modal coordinates with which each piece begins
-    velocity: Floats  # (room, n), reduced velocity after each event
+    rate: Floats  # (room, 2, q), rates of gaps, then slips, after each event, m/s, of pairs with impulses
     given: Floats  # (room, 2, q), normal and tangential impulses of each event, N s
 
 
-def new_trail(m: int, n: int, q: int) -> Trail:
-    """Room for a trail of a case with m modal coordinates, n reduced degrees and q pairs."""
-    room = max(1, min(MOST_EVENTS, MOST_BYTES // (8 * (2 * m + n + 2 * q))))
-    return _with_room(room, m, n, q)
+def new_trail(m: int, q: int) -> Trail:
+    """Room for a trail of a case with m modal coordinates and q pairs."""
+    room = max(1, min(MOST_EVENTS, MOST_BYTES // (8 * (2 * m + 4 * q))))
+    return _with_room(room, m, q)
 
 
 def no_trail() -> Trail:
     """A trail without room."""
-    return _with_room(0, 1, 1, 1)
+    return _with_room(0, 1, 1)
 
 
-def _with_room(room: int, m: int, n: int, q: int) -> Trail:
+def _with_room(room: int, m: int, q: int) -> Trail:
     return Trail(
         n_event=np.zeros(1, dtype=np.int64),
         states=np.zeros(room + 1, dtype=np.int64),
         tick=np.zeros(room, dtype=np.int64),
         crossing=np.zeros(room, dtype=np.int64),
         begun=np.empty((room + 1, 2, m)),
-        velocity=np.empty((room, n)),
+        rate=np.empty((room, 2, q)),
         given=np.empty((room, 2, q)),
     )
 
@@ -72,14 +72,12 @@ def note_event(trail: Trail, tick: int, crossing: int) -> None:
 
 
 @jit_inline
-def note_after(trail: Trail, motion: Floats, given: Floats) -> None:
-    """Store the motion (2 n,) after the event, and its normal and tangential impulses (2, q)."""
+def note_after(trail: Trail, rate: Floats, slip: Floats, given: Floats) -> None:
+    """Store rates of gaps and slips (q,), m/s, after the event, and its impulses (2, q)."""
     k = trail.n_event[0]
     if trail.tick.size > 0 and k >= 0:
-        n = trail.velocity.shape[1]
-        for i in range(n):
-            trail.velocity[k, i] = motion[n + i]
         for i in range(given.shape[1]):
+            trail.rate[k, 0, i], trail.rate[k, 1, i] = rate[i], slip[i]
             trail.given[k, 0, i], trail.given[k, 1, i] = given[0, i], given[1, i]
 
 

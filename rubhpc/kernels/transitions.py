@@ -160,6 +160,7 @@ def pass_block(
 
 
 @jit_lean_sum
+@short_loops
 def loss_gained(transitions: Transitions, mode: int, m: int, begun: Floats, z: Floats) -> float:
     """Loss of damping, J, between coordinates (2, m) of a mode, by the blocks of its form.
 
@@ -179,15 +180,27 @@ def loss_gained(transitions: Transitions, mode: int, m: int, begun: Floats, z: F
             new, old = z[part, here - part * m], begun[part, here - part * m]
             change[k], total[k] = new - old, new + old
         place += size
-        for k in range(0, size, 4):  # four rows at a time: one would wait for its sum
-            block = k - k % LANES  # where the block on the diagonal begins
-            one, two = rows[k * size : (k + 1) * size], rows[(k + 1) * size : (k + 2) * size]
-            three, four = rows[(k + 2) * size : (k + 3) * size], rows[(k + 3) * size : (k + 4) * size]
-            a, b, c, d = change[k], change[k + 1], change[k + 2], change[k + 3]
-            e, f, g, h = total[k], total[k + 1], total[k + 2], total[k + 3]
-            for j in range(block):  # symmetric: what is beside the diagonal is read once
-                loss += (a * one[j] + b * two[j] + c * three[j] + d * four[j]) * total[j]
-                loss += (e * one[j] + f * two[j] + g * three[j] + h * four[j]) * change[j]
+        for block in range(0, size, LANES):  # eight rows at a time: one would wait for its sum
+            first, second = rows[block * size :], rows[(block + 1) * size :]
+            third, fourth = rows[(block + 2) * size :], rows[(block + 3) * size :]
+            fifth, sixth = rows[(block + 4) * size :], rows[(block + 5) * size :]
+            seventh, eighth = rows[(block + 6) * size :], rows[(block + 7) * size :]
+            a, b, c, d = change[block], change[block + 1], change[block + 2], change[block + 3]
+            e, f, g, h = change[block + 4], change[block + 5], change[block + 6], change[block + 7]
+            p, q, r, s = total[block], total[block + 1], total[block + 2], total[block + 3]
+            t, u, v, w = total[block + 4], total[block + 5], total[block + 6], total[block + 7]
+            for j in range(block):  # symmetric: what is not on the diagonal is read once
+                loss += (
+                    (a * first[j] + b * second[j] + c * third[j] + d * fourth[j])
+                    + (e * fifth[j] + f * sixth[j] + g * seventh[j] + h * eighth[j])
+                ) * total[j]
+                loss += (
+                    (p * first[j] + q * second[j] + r * third[j] + s * fourth[j])
+                    + (t * fifth[j] + u * sixth[j] + v * seventh[j] + w * eighth[j])
+                ) * change[j]
             for j in range(block, block + LANES):
-                loss += (a * one[j] + b * two[j] + c * three[j] + d * four[j]) * total[j]
+                loss += (
+                    (a * first[j] + b * second[j] + c * third[j] + d * fourth[j])
+                    + (e * fifth[j] + f * sixth[j] + g * seventh[j] + h * eighth[j])
+                ) * total[j]
     return loss

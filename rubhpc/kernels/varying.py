@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit
+from rubhpc.kernels.contact_modes import STILL
 
 if TYPE_CHECKING:
     from rubhpc.kernels.contact_modes import ModeTables
@@ -90,6 +91,10 @@ def vary_rates(tables: ModeTables, mode: int, exponent: Complexes, n_eigenmode: 
             if i < tables.bend_re.shape[1]:
                 rate = rate * exponent[k]
                 tables.bend_re[mode, i, k], tables.bend_im[mode, i, k] = rate.real, rate.imag
+            if i < tables.primitive_re.shape[1]:
+                switch = complex(tables.switch_re[mode, i, k], tables.switch_im[mode, i, k])
+                whole = switch / exponent[k] if abs(exponent[k]) > STILL else 0j
+                tables.primitive_re[mode, i, k], tables.primitive_im[mode, i, k] = whole.real, whole.imag
     for i in range(tables.slip_re.shape[1]):
         for k in range(n_eigenmode):
             rate = complex(tables.slip_re[mode, i, k], tables.slip_im[mode, i, k]) * exponent[k]

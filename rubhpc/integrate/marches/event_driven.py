@@ -204,9 +204,9 @@ class EventDrivenMarch(ContactSets):
         return new_trail(*self.width)
 
     @property
-    def width(self) -> tuple[int, int, int]:
-        """How many modal coordinates, reduced degrees and pairs a trail of the case has."""
-        return self._z.shape[1], self.bodies.stiffness.shape[0], self._clearance.size
+    def width(self) -> tuple[int, int]:
+        """How many modal coordinates and pairs a trail of the case has."""
+        return self._z.shape[1], self._clearance.size
 
     def keep(self, trail: Trail | None) -> None:
         """Have the events from here on noted in a trail, or in none."""

@@ -13,7 +13,6 @@ from rubhpc.integrate.marches.march import NO_FORCES
 from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.marches.workspace import empty_workspace
 from rubhpc.integrate.record import State
-from rubhpc.integrate.reduced_model.array_room import aligned
 from rubhpc.integrate.reduced_model.friction_mode import mask_of, states_of
 from rubhpc.integrate.reduced_model.transitions import MetTransitions, TransitionRoom
 from rubhpc.kernels.case_progress import (
@@ -24,12 +23,13 @@ from rubhpc.kernels.case_progress import (
     follow,
     shaft_angle,
 )
-from rubhpc.kernels.contact_modes import ModeTables
+from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE, ModeTables
 from rubhpc.kernels.event_forces import friction_work
 from rubhpc.kernels.friction_change import change_states
 from rubhpc.kernels.friction_loop import advance_with_friction
 from rubhpc.kernels.friction_pieces import AT_REST, LEAST_FORCE, advance_friction_pieces
 from rubhpc.kernels.friction_sections import advance_friction_sections
+from rubhpc.kernels.friction_spans import new_spans
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, MOST_PAIRS, OPEN, STUCK, FrictionBodies
 from rubhpc.kernels.trail import BROKEN
 from rubhpc.kernels.transitions import NO_TRANSITIONS
@@ -180,8 +180,10 @@ class FrictionMarch(EventDrivenMarch):
     def _use(self, tables: ModeTables) -> None:
         super()._use(tables)
         self._transitions = None
-        if self._recorder.begun.shape != self._z.shape:
-            self._recorder = self._recorder._replace(begun=aligned(self._z.shape))
+        if self._recorder.spans.path.shape[1:] != self._z.shape:
+            n_row = self._recorder.value.size // SAMPLES_AT_ONCE
+            spans = new_spans(self._z.shape[1], self._clearance.size, n_row)
+            self._recorder = self._recorder._replace(spans=spans)
 
     def _soften(self, solver: Workspace) -> None:
         """Change how normal forces follow from gaps: here they hold them, and nothing changes."""

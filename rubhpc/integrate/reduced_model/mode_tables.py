@@ -81,9 +81,12 @@ def tabulate(
     is_fast = (exponent.imag == 0.0) & (exponent.real * tick * 2.0**sample_level < -1.0)
     rate = switch * exponent
     sliding = (slip if is_measured else slip[:0]) @ motion[n:]
-    bend = np.zeros((0, m), dtype=complex)
+    bend = primitive = np.zeros((0, m), dtype=complex)
     if isinstance(mode, FrictionMode):
         bend, growing = switch * exponent**2, growth_of(mode)
+        if is_measured:
+            moves = np.abs(exponent) > kernel.STILL
+            primitive = np.where(moves, switch / np.where(moves, exponent, 1.0), 0.0)
         rate[:, growing.steady] += switch[:, growing.which] @ growing.speed
     output = np.zeros((2 * m, 0))
     if is_measured:
@@ -102,6 +105,8 @@ def tabulate(
         bend_re=bend.real,
         bend_im=bend.imag,
         turn=np.abs(bend) * np.abs(exponent) * np.where(is_fast, -1.0, growth),
+        primitive_re=primitive.real,
+        primitive_im=primitive.imag,
         pace=np.where(exponent.real * tick * 2**kernel.FORCED_LEVEL < GONE, kernel.DYING, np.abs(exponent)),
         power_re=power.real,
         power_im=power.imag,
