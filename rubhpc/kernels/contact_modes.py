@@ -44,9 +44,7 @@ class ModeTables(NamedTuple):
     bend_re: Floats  # (p, q, m), its second time derivative; under set-valued friction alone, as the next
     bend_im: Floats
     turn: Floats  # (p, q, m), bound on its third time derivative; negative: decays within a sample
-    primitive_re: (
-        Floats  # (p, q, m), its primitive in time, zero of coordinates that have none; where measured
-    )
+    primitive_re: Floats  # (p, q, m), its primitive in time, zero of coordinates that have none
     primitive_im: Floats
     pace: Floats  # (p, m), size of the exponent, 1/s, or DYING
     power_re: Floats  # (p, n_level, m), exponential of each mode over 2^level ticks

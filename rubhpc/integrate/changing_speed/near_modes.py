@@ -103,7 +103,8 @@ def near_mode(
     every_shape = np.hstack([shape, shape[:, paired].conj()])[:, moved]
     motion[:, columns] = every_shape @ share * weight[columns]
     new_exponent = mode.exponent.copy()
-    new_exponent[columns] = exponents
+    # Decays stay real to the last bit: kernels know by that what does not vibrate.
+    new_exponent[columns] = np.where(mode.exponent[columns].imag == 0.0, exponents.real, exponents)
     still = mode.motion[:, m + 1 :].real
     if (load := change @ still).any():
         mirrored = share[np.searchsorted(moved, swap[moved])][:, weight[columns] > 1.5].conj()

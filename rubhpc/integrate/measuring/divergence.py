@@ -19,9 +19,12 @@ if TYPE_CHECKING:
 def energy_limit(model: Model, spin: float, displacement_limit: float) -> float:
     """Mechanical energy, J, beyond which a motion has diverged; inf for an unconstrained rotor.
 
-    It is that of the rotor whose output node whirls with the spin (rad/s) at the displacement limit (m), in
-    the shape of its static response to a force there. A stator whose tip bends far stays below it; a body
-    whose motion grows without bound does not, even where the rotor hardly moves.
+    It is that of a rotor that whirls with its output node at the displacement limit d (m), in the shape x of
+    its static response to a force there, with every stator pressed: `(d^2 k + s^2 m) / 2`. Here m is
+    `x' M x`, k is `x' K x` and the stators' static stiffness, and s the speed of the output node in the
+    fastest whirl that friction can keep up: with the spin (rad/s), rolling without slip, or at the frequency
+    `sqrt(k / m)` of rotor and stators together. A stator whose tip bends far stays below it; a body whose
+    motion grows without bound does not, even where the rotor hardly moves.
     """
     stiffness, mass = model.rotor.stiffness, model.rotor.mass
     rows = [row for row in output_degrees(model)[:2] if row >= 0]
@@ -29,11 +32,26 @@ def energy_limit(model: Model, spin: float, displacement_limit: float) -> float:
         shape = np.linalg.solve(stiffness, np.eye(len(stiffness))[:, rows])
     except np.linalg.LinAlgError:
         return np.inf
+    rolling = abs(spin) * max((stator.radius for stator in model.stators), default=0.0)
     largest = 0.0
     for k, row in enumerate(rows):
         along = shape[:, k] / shape[row, k]
-        largest = max(largest, float(along @ (stiffness + spin**2 * mass) @ along))
-    return 0.5 * displacement_limit**2 * largest if largest > 0.0 else np.inf
+        inertia = float(along @ mass @ along)
+        held = float(along @ stiffness @ along) + _stiffness_of_stators(model, along)
+        elastic = displacement_limit**2 * held
+        kinetic = max(elastic, max(displacement_limit * abs(spin), rolling) ** 2 * inertia)
+        largest = max(largest, 0.5 * (elastic + kinetic))
+    return largest if largest > 0.0 else np.inf
+
+
+def _stiffness_of_stators(model: Model, along: Floats) -> float:
+    """Static stiffness, N/m, that the stators add to a rotor's shape, each where it rubs; none of walls."""
+    total = 0.0
+    for stator in model.stators:
+        rows = [row for name in ("v", "w") if (row := model.rotor.index(stator.node, name)) >= 0]
+        if stator.axial_compliance > 0.0:
+            total += float(np.sum(along[rows] ** 2)) / stator.axial_compliance
+    return total
 
 
 def judged_nodes(model: Model) -> tuple[int, ...]:
@@ -50,4 +68,4 @@ def displacement_reason(model: Model, displacement: Floats, limit: float) -> str
 
 def energy_reason(limit: float) -> str:
     """Reason of a case whose energy has passed its limit, J."""
-    return f"the mechanical energy passed {limit:.3g} J, that of the rotor at its displacement limit"
+    return f"the mechanical energy passed {limit:.3g} J, that of rotor and stators at the displacement limit"

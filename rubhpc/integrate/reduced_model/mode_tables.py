@@ -84,9 +84,8 @@ def tabulate(
     bend = primitive = np.zeros((0, m), dtype=complex)
     if isinstance(mode, FrictionMode):
         bend, growing = switch * exponent**2, growth_of(mode)
-        if is_measured:
-            moves = np.abs(exponent) > kernel.STILL
-            primitive = np.where(moves, switch / np.where(moves, exponent, 1.0), 0.0)
+        moves = np.abs(exponent) > kernel.STILL
+        primitive = np.where(moves, switch / np.where(moves, exponent, 1.0), 0.0)
         rate[:, growing.steady] += switch[:, growing.which] @ growing.speed
     output = np.zeros((2 * m, 0))
     if is_measured:

@@ -54,6 +54,18 @@ def maps(tables, place):
     }
 
 
+def assert_primitives(tables, row):
+    """Under set-valued friction they are there without energies too: records read impulses from them."""
+    if not tables.bend_re.size:
+        return
+    switch, rate, whole = (
+        getattr(tables, name + "_re")[row] + 1j * getattr(tables, name + "_im")[row]
+        for name in ("switch", "rate", "primitive")
+    )
+    m = int(tables.n_eigenmode[row]) + 1
+    assert whole[:, :m] * rate[:, :m] == pytest.approx(switch[:, :m] ** 2, rel=1e-9)
+
+
 def library_of(base, law, at, *, is_risen=False):
     phasor = (base.reduced.force[0] - 1j * base.reduced.force[1]) / base.spin**2
     return law.kind(
@@ -87,7 +99,9 @@ def error_at(base, law, at, masks, place, rise=0.0, *, is_risen=False):
         assert library.add(mask)
         assert library.follows(mask)
         assert not library.tables().loss.size
-        found = maps(library.tables(), library.masks.index(mask))
+        tables, row = library.tables(), library.masks.index(mask)
+        found = maps(tables, row)
+        assert_primitives(tables, row)
         expected = law.tables(library, reduced, base, mask, levels | {"width": library.width})
         for name, true in maps(expected, 0).items():
             largest = max(np.abs(true).max(initial=0.0), 1e-30)
@@ -136,4 +150,5 @@ def test_modes_near_a_known_one_are_those_solved(q, law):
         for name in ("exponent", "motion", "switch"):
             own, expected = getattr(near, name)[..., ~response], getattr(true, name)[..., ~response]
             assert np.abs(own - expected).max() <= 1e-8 * np.abs(expected).max(), (mask, name)
+        assert not near.exponent[mode.exponent.imag == 0.0].imag.any()  # by that kernels know decays
     assert n_near > 0
