@@ -89,13 +89,22 @@ def changes_at(tables: ModeTables, mode: int, z: Floats, overlap: float, tick: i
 def move_ticks(
     tables: ModeTables, bodies: FrictionBodies, mode: int, count: int, tick: float, z: Floats, target: Floats
 ) -> None:
-    """Fill `target` (2, m) with the coordinates `count` ticks (s) after `z`, as many as are used."""
+    """Fill `target` (2, m) with the coordinates `count` ticks (s) after `z`, as many as are used.
+
+    At most `longest_move` ticks: there are no exponentials over more.
+    """
     used = used_width(tables, mode)
     z_re, z_im = target[0, :used], target[1, :used]
     go_on(count, tables.power_re[mode], tables.power_im[mode], z[0, :used], z[1, :used], z_re, z_im)
     states = tables.mask[mode]
     if stuck_pairs(states) != 0:
         move_stuck(states, tables.n_eigenmode[mode], bodies.rim_speed, count * tick, z_re)
+
+
+@jit_inline_sum
+def longest_move(tables: ModeTables) -> int:
+    """Ticks that can be passed at once: those of all levels of exponentials together."""
+    return int((1 << tables.power_re.shape[1]) - 1)
 
 
 @jit_inline_sum

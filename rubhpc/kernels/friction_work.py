@@ -11,7 +11,7 @@ from rubhpc.kernels._jit import jit_inline_sum, short_loops
 from rubhpc.kernels.contact_modes import ModeTables, dot
 from rubhpc.kernels.coordinate_steps import turn_on
 from rubhpc.kernels.cubics import turning_value
-from rubhpc.kernels.event_search import move_stuck
+from rubhpc.kernels.event_search import longest_move, move_stuck
 from rubhpc.kernels.friction_coordinates import used_width
 from rubhpc.kernels.friction_spans import copy_coordinates
 from rubhpc.kernels.friction_states import FrictionBodies, stuck_pairs
@@ -63,7 +63,8 @@ def rub_through(
     stride_re, stride_im = stride[0, :used], stride[1, :used]
     before = dot(slip_re, slip_im, start[0], start[1])
     impulse, total, least, most, left, known = 0.0, 0.0, before, before, n_tick, -1
-    longest = max(1, int(min(resolved_panel(tables, mode, i, start) / clock.tick, 1.0 * n_tick)))
+    reach = min(n_tick, longest_move(tables))
+    longest = max(1, int(min(resolved_panel(tables, mode, i, start) / clock.tick, 1.0 * reach)))
     panel = even_panel(left, longest)
     while left >= N_PANEL:
         if panel != known:

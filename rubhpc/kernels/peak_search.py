@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import jit_inline_sum, jit_part_sum
 from rubhpc.kernels.accumulators import observe_force
 from rubhpc.kernels.contact_modes import DYING, FORCED_LEVEL, RESOLVED, ModeTables, dot, floor_log2
-from rubhpc.kernels.event_search import move_ticks
+from rubhpc.kernels.event_search import longest_move, move_ticks
 from rubhpc.kernels.force_average import AVERAGING_TIME
 from rubhpc.kernels.friction_spans import copy_coordinates
 from rubhpc.kernels.friction_states import STUCK, FrictionBodies, state_of
@@ -70,8 +70,12 @@ def follow_force(
     at, ahead, begin = spans.path[2], spans.path[3], spans.tick[s, 0]
     copy_coordinates(spans.begun[s], at)
     copy_coordinates(at, ahead)
-    if now > begin:
-        move_ticks(tables, bodies, mode, now - begin, clock.tick, spans.begun[s], at)
+    passed = begin
+    while passed < now:  # in few moves: spans are longer than the exponentials reach
+        count = min(longest_move(tables), now - passed)
+        move_ticks(tables, bodies, mode, count, clock.tick, at, ahead)
+        passed += count
+        at, ahead = ahead, at
     is_stuck = state_of(tables.mask[mode], i) == STUCK
     share = 0.5 / bodies.static[i] if is_stuck else 1.0
     before = force_at(tables, mode, i, share, is_stuck, at)

@@ -131,7 +131,7 @@ def test_a_store_shows_where_the_stators_stand_and_which_cases_diverged(tmp_path
     """Dry friction drives the whirl of a ring without bound: a result of its own, which stops nothing."""
     (tmp_path / "study.toml").write_text(
         'rig = "ring.toml"\n[grid]\nspeed_ratio = 1.5\nclearance_ratio = 0.8\nfriction = [0.3, 0.02]\n'
-        "[record]\ntransient = 8\nrevolutions = 2\nsamples_per_revolution = 64\n"
+        "[record]\ntransient = 12\nrevolutions = 2\nsamples_per_revolution = 64\n"
     )
     packaged = PACKAGED_FILE.read_text().replace("[[stator]]", "[[stator]]\ncount = 3")
     (tmp_path / "ring.toml").write_text(packaged)
