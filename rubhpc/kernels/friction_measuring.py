@@ -12,6 +12,7 @@ from rubhpc.kernels.accumulators import DAMPING_LOSS, observe_force, observe_rub
 from rubhpc.kernels.case_progress import Clock, Progress  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE, ModeTables
 from rubhpc.kernels.event_search import move_ticks
+from rubhpc.kernels.force_average import AVERAGING_TIME
 from rubhpc.kernels.friction_coordinates import add_energies
 from rubhpc.kernels.friction_spans import (
     AFTER,
@@ -24,7 +25,7 @@ from rubhpc.kernels.friction_spans import (
 )
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, FrictionBodies, state_of
 from rubhpc.kernels.friction_work import rub_through
-from rubhpc.kernels.peak_search import follow_force
+from rubhpc.kernels.peak_search import follow_force, recent_impulse
 from rubhpc.kernels.sampling import Recorder, read_samples, widen_extrema
 from rubhpc.kernels.span_forces import begin_force, pass_force
 from rubhpc.kernels.transitions import Transitions  # noqa: TC001 - part of a kernel's signature
@@ -45,7 +46,7 @@ def observe_spans(
     transitions: Transitions,
 ) -> None:
     """Measure the spans that are kept: samples, energies, forces and friction, and make room for others."""
-    spans = recorder.spans
+    spans, near = recorder.spans, int(AVERAGING_TIME / clock.tick) + 1
     n_span, level, n_part, first_sample = spans.noted[0], clock.sample_level, 0, progress.next_sample
     for s in range(n_span):
         spans.first[s] = n_part
@@ -74,12 +75,29 @@ def observe_spans(
             for i in range(bodies.rim_speed.size):
                 if state_of(states, i) == OPEN:
                     continue
-                force = spans.force[part, i]
-                if force[MOST] > accumulator.peak_force[i]:
-                    follow_force(tables, bodies, clock, mode, s, i, now, stop, recorder, accumulator)
+                force, begin, time = spans.force[part, i], now * clock.tick, (stop - now) * clock.tick
+                peak, hit = accumulator.peak_force[i], recent_impulse(i, begin, accumulator)
+                hits = spans.given[s, i] if stop == end else 0.0
+                is_high = force[MOST] > peak
+                if is_high or (hit + hits > 0.0 and force[MOST] + (hit + hits) / AVERAGING_TIME > peak):
+                    # A mean over an impact has its impulse too: the force is followed near that.
+                    calm_from = stop if is_high else now + near * (hit > 0.0)
+                    calm_to = stop - near * (hits > 0.0)
+                    follow_force(
+                        tables,
+                        bodies,
+                        clock,
+                        mode,
+                        s,
+                        i,
+                        now,
+                        stop,
+                        calm_from,
+                        calm_to,
+                        recorder,
+                        accumulator,
+                    )
                 else:
-                    time = (stop - now) * clock.tick
-                    begin = now * clock.tick
                     observe_force(i, begin, time, force[IMPULSE], force[BEFORE], force[AFTER], accumulator)
             now = stop
         for i in range(bodies.rim_speed.size):

@@ -11,7 +11,7 @@ from rubhpc.kernels._jit import jit_inline_sum, jit_part_sum
 from rubhpc.kernels.accumulators import observe_force
 from rubhpc.kernels.contact_modes import DYING, FORCED_LEVEL, RESOLVED, ModeTables, dot, floor_log2
 from rubhpc.kernels.event_search import longest_move, move_ticks
-from rubhpc.kernels.force_average import AVERAGING_TIME
+from rubhpc.kernels.force_average import AVERAGING_TIME, BEGIN, COUNT, END, IMPULSE, OLDEST
 from rubhpc.kernels.friction_spans import copy_coordinates
 from rubhpc.kernels.friction_states import STUCK, FrictionBodies, state_of
 from rubhpc.kernels.friction_work import gains
@@ -49,6 +49,20 @@ def resolved_force(tables: ModeTables, mode: int, i: int, age: float, z: Floats)
     return float(np.sqrt(np.sqrt(0.25 * RESOLVED * spared * whole / bend))) if bend > 0.0 else np.inf
 
 
+@jit_inline_sum
+def recent_impulse(i: int, time: float, accumulator: Accumulator) -> float:
+    """What impacts have given to pair i within the averaging time before a `time` (s), N s."""
+    piece, most = accumulator.force_piece[i], accumulator.force_piece.shape[2]
+    oldest, count = accumulator.force_held[i, OLDEST], accumulator.force_held[i, COUNT]
+    begin, given = time + accumulator.origin[0] - AVERAGING_TIME, 0.0
+    for back in range(1, count + 1):
+        k = (oldest + count - back) % most
+        if piece[END, k] <= begin:
+            break
+        given += piece[IMPULSE, k] if piece[END, k] == piece[BEGIN, k] else 0.0
+    return given
+
+
 @jit_part_sum
 def follow_force(
     tables: ModeTables,
@@ -59,12 +73,15 @@ def follow_force(
     i: int,
     now: int,
     stop: int,
+    calm_from: int,
+    calm_to: int,
     recorder: Recorder,
     accumulator: Accumulator,
 ) -> None:
     """Add the force of closed pair i in span s between two ticks.
 
-    What an event sets off is fast at first: no piece is longer than the contact mode has lasted.
+    What an event sets off is fast at first: no piece is longer than the contact mode has lasted. From
+    `calm_from` to `calm_to` pieces are long.
     """
     spans = recorder.spans
     at, ahead, begin = spans.path[2], spans.path[3], spans.tick[s, 0]
@@ -81,7 +98,9 @@ def follow_force(
     before = force_at(tables, mode, i, share, is_stuck, at)
     while now < stop:
         longest = 1 << FORCED_LEVEL
-        if now > begin:
+        if calm_from <= now < calm_to:
+            longest = min(calm_to - now, longest_move(tables))
+        elif now > begin:
             age = now - begin
             resolved = resolved_force(tables, mode, i, age * clock.tick, at) / clock.tick
             longest = 1 << floor_log2(int(max(1.0, min(resolved, 1.0 * age, 1.0 * (stop - now)))))

@@ -1,10 +1,12 @@
 """What is measured of spans between events, by quadrature of the closed form, and by other samples."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from trial_rig import trial_rig
 
-from rubhpc import State, simulate
+from rubhpc import LumpedStator, State, simulate
 from rubhpc.integrate.marches.friction import FrictionMarch
 from rubhpc.integrate.measuring.samples import empty_samples, new_accumulator
 from rubhpc.integrate.reduced_model.friction_mode import states_of
@@ -97,3 +99,13 @@ def test_a_record_of_many_samples_is_that_of_few(per_revolution):
     np.testing.assert_allclose(many.vertical[::every], few.vertical, atol=1e-6 * scale)
     means = many.contact_force[0].reshape(-1, every).mean(axis=1)
     np.testing.assert_allclose(means, few.contact_force[0], atol=1e-6 * few.contact_force.max())
+
+
+def test_peaks_of_walls_are_those_of_steady_sliding():
+    """A wall gives an impulse and then a force that grows within the averaging time; slips never reverse."""
+    walls = tuple(LumpedStator(node=3, rigid=True, angle=0.3 + 0.5 * np.pi * i) for i in range(4))
+    rig, case = replace(trial_rig(1), stator=walls), CASE | {"friction": 0.2, "clearance": "40 um"}
+    case |= {"speed": 300.0, "transient": 0, "revolutions": 2, "samples_per_revolution": 64}
+    set_valued, steady = (simulate(rig, **case | {"friction_law": law}) for law in ("coulomb", "sliding"))
+    assert set_valued.minimum_slip_speed.min() > 0.0
+    assert set_valued.peak_contact_force == pytest.approx(steady.peak_contact_force, rel=2e-6)
