@@ -37,7 +37,7 @@ class Pieces(NamedTuple):
     force: Floats  # (k, 2, n), of the unbalance: times cosine and sine of the shaft's angle
     since: Floats  # (k,), s, from the beginning of the previous piece to that of this one
     table: Ints  # (p,), set of closed pairs of each of the tables, NONE for one that is not tuned
-    n_room: int  # tables of each set, one per piece
+    n_room: int  # tables of each set, for as many consecutive pieces
     n_sample: int  # of a piece
     n_part_sample: int  # of each of its parts, which have their own sums
     energy_limit: float  # J
@@ -100,7 +100,7 @@ def end_piece(pieces: Pieces, piece: int, n_step: int, standing: int, z: Floats,
 def set_masks(mask: Ints, table: Ints, n_room: int, piece: int) -> None:
     """Enable only the tables that are tuned to a piece."""
     for place in range(mask.size):
-        mask[place] = table[place] if place % n_room == piece else NONE
+        mask[place] = table[place] if place % n_room == piece % n_room else NONE
 
 
 @jit_lean_sum

@@ -11,22 +11,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit
-from rubhpc.kernels.contact_modes import (
-    DYING,
-    FORCED_LEVEL,
-    SAMPLES_AT_ONCE,
-    STILL,
-    ModeTables,
-)
+from rubhpc.kernels._jit import jit, jit_lean_sum
+from rubhpc.kernels.contact_modes import STILL, ModeTables
+from rubhpc.kernels.retuning_exponentials import retune_bounds, retune_outputs, retune_powers
 from rubhpc.kernels.retuning_laws import RimPart, Springs, follow_growth, move_rim, stretch_springs
 from rubhpc.kernels.varying import Varying, vary, vary_rates
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
-SQUARED = 4  # levels of exponentials, of which one is evaluated and the others follow by squaring
-GONE = -40.0  # exponent of what has died away
 STEADY = 1e-13  # sum of two exponents over the greatest, below which it is zero but for rounding
 
 
@@ -39,7 +32,6 @@ class HeldMode(NamedTuple):
     n_coordinate: int  # m + 1 + q
     exponent: Complexes  # (width,), 1/s; that of the response is filled in
     is_pair: NDArray[np.bool_]  # (m,), whether a mode stands for a conjugate pair, and is doubled
-    motion: Complexes  # (m, 2 n), displacements, then velocities
     drive: Complexes  # (m,), share of the unbalance at unit speed
     mirrored_drive: Complexes  # (m,), that of the conjugate modes
     switch: Floats  # (q, 2 n), gap or force with the motion
@@ -118,27 +110,33 @@ def retune_to(
         move_rim(tables, mode, held.rim, share, held.rate, held.resisting, held.row, held.work)
     exponent = held.exponent
     exponent[m] = turning
-    x = np.zeros(2 * n, dtype=np.complex128)
+    shares, moved = np.empty((4, m)), np.empty((2, 3 * n))
     for k in range(m):
         direct = held.drive[k] * factor / (turning - exponent[k])
-        other = np.conj(direct)
+        other, mirrored = np.conj(direct), direct
         if held.is_pair[k]:
             mirrored = held.mirrored_drive[k] * factor / (turning - np.conj(exponent[k]))
             other = np.conj(mirrored)
-            for a in range(2 * n):
-                x[a] += 0.5 * (held.motion[k, a] * direct + np.conj(held.motion[k, a]) * mirrored)
-        else:
-            for a in range(2 * n):
-                x[a] += held.motion[k, a] * direct
         cosine, sine = 0.5 * (direct + other), 0.5j * (direct - other)
         tables.enter_cosine[mode, 0, k], tables.enter_cosine[mode, 1, k] = cosine.real, cosine.imag
         tables.enter_sine[mode, 0, k], tables.enter_sine[mode, 1, k] = sine.real, sine.imag
+        of_real, of_imaginary = direct, 1j * direct
+        if held.is_pair[k]:
+            of_real, of_imaginary = 0.5 * (direct + mirrored), 0.5j * (direct - mirrored)
+        shares[0, k], shares[1, k] = of_real.real, of_real.imag
+        shares[2, k], shares[3, k] = of_imaginary.real, of_imaginary.imag
+    _respond(tables.motion_re[mode], tables.motion_im[mode], shares, moved)
+    x = np.empty(2 * n, dtype=np.complex128)
     for a in range(2 * n):
-        tables.motion_re[mode, a, m], tables.motion_im[mode, a, m] = x[a].real, x[a].imag
+        x[a] = complex(moved[0, a], moved[1, a])
+        tables.motion_re[mode, a, m], tables.motion_im[mode, a, m] = moved[0, a], moved[1, a]
+    for a in range(n):
+        acceleration = x[n + a] * turning
+        moved[0, 2 * n + a], moved[1, 2 * n + a] = acceleration.real, acceleration.imag
+    seen = np.empty((2, max(held.switch.shape[0], held.slip.shape[0], held.output.shape[0])))
+    _look(held.switch, moved[:, : 2 * n], seen)
     for i in range(held.switch.shape[0]):
-        switch = -factor * held.reaction[i]
-        for a in range(2 * n):
-            switch += held.switch[i, a] * x[a]
+        switch = complex(seen[0, i], seen[1, i]) - factor * held.reaction[i]
         tables.switch_re[mode, i, m], tables.switch_im[mode, i, m] = switch.real, switch.imag
         if i < tables.primitive_re.shape[1]:
             whole = switch / turning if abs(turning) > STILL else 0j
@@ -148,23 +146,18 @@ def retune_to(
         if i < tables.bend_re.shape[1]:
             switch = switch * turning
             tables.bend_re[mode, i, m], tables.bend_im[mode, i, m] = switch.real, switch.imag
+    _look(held.slip, moved[:, n : 2 * n], seen)
     for i in range(held.slip.shape[0]):
-        slip = 0j
-        for a in range(n):
-            slip += held.slip[i, a] * x[n + a]
+        slip = complex(seen[0, i], seen[1, i])
         tables.slip_re[mode, i, m], tables.slip_im[mode, i, m] = slip.real, slip.imag
         slip = slip * turning
         tables.slip_rate_re[mode, i, m], tables.slip_rate_im[mode, i, m] = slip.real, slip.imag
-    _retune_powers(tables, mode, exponent, end, tick, interval)
+    retune_powers(tables, mode, exponent, end, tick)
+    retune_bounds(tables, mode, exponent, end, tick, interval)
+    _look(held.output, moved, seen)
     for o in range(held.output.shape[0]):
-        total = 0j
-        for a in range(n):
-            total += (
-                held.output[o, a] * x[a]
-                + (held.output[o, n + a] + held.output[o, 2 * n + a] * turning) * x[n + a]
-            )
-        held.row[o, m] = total
-    _retune_outputs(tables.output[mode], held.row, exponent, end, interval)
+        held.row[o, m] = complex(seen[0, o], seen[1, o])
+    retune_outputs(tables.output[mode], held.row, exponent, end, interval)
     if tables.loss.shape[1] == 0:  # no energies
         return
     _retune_energies(tables, mode, held, x, factor)
@@ -174,69 +167,30 @@ def retune_to(
         stretch_springs(tables, mode, held.springs, m, held.rim.one)
 
 
-@jit
-def _retune_powers(
-    tables: ModeTables, mode: int, exponent: Complexes, end: int, tick: float, interval: float
-) -> None:
-    """Exponentials of the first `end` coordinates, and what bounds and paces have of them."""
-    n_level = tables.power_re.shape[1]
-    power_re, power_im = tables.power_re[mode], tables.power_im[mode]
-    for level in range(n_level):
-        re, im = power_re[level], power_im[level]
-        if level % SQUARED == 0:
-            time = tick * 2.0**level
-            for k in range(end):
-                power = _exponential(exponent[k], time)
-                re[k], im[k] = power.real, power.imag
-        else:  # to square doubles the rounding
-            re_before, im_before = power_re[level - 1], power_im[level - 1]
-            for k in range(end):
-                a, b = re_before[k], im_before[k]
-                re[k], im[k] = a * a - b * b, 2.0 * (a * b)
-    for k in range(end):
-        size = abs(exponent[k])
-        growth = np.exp(exponent[k].real * tick * 2.0 ** (n_level - 1)) if exponent[k].real > 0.0 else 1.0
-        for i in range(tables.bound.shape[1]):
-            re_of, im_of = tables.switch_re[mode, i, k], tables.switch_im[mode, i, k]
-            bound = np.sqrt(re_of * re_of + im_of * im_of) * size * size * growth
-            tables.bound[mode, i, k] = bound
-            if i < tables.turn.shape[1]:
-                is_fast = exponent[k].imag == 0.0 and exponent[k].real * interval < -1.0
-                tables.turn[mode, i, k] = -bound * size if is_fast else bound * size
-        is_gone = exponent[k].real * tick * 2.0**FORCED_LEVEL < GONE
-        tables.pace[mode, k] = DYING if is_gone else size
+@jit_lean_sum
+def _respond(re: Floats, im: Floats, shares: Floats, moved: Floats) -> None:
+    """Response (2, 3 n), real and imaginary part, but for its last third.
 
-
-@jit
-def _retune_outputs(output: Floats, row: Complexes, exponent: Complexes, end: int, interval: float) -> None:
-    """Outputs at coming samples by the first `end` coordinates; zeros that stay are left.
-
-    Most are: a coordinate of an open stator is seen by the outputs of this stator alone.
+    Eigenmodes are real and imaginary parts (2 n, width); `shares` (4, m) are what it has of the real ones,
+    real and imaginary part, and of the imaginary ones.
     """
-    n_output, width = row.shape
-    seen = np.empty(n_output, dtype=np.int64)
-    for k in range(end):
-        real, imaginary = output[k], output[width + k]
-        count = 0
-        for o in range(n_output):
-            if row[o, k] != 0.0 or real[o] != 0.0 or imaginary[o] != 0.0:
-                seen[count] = o
-                count += 1
-        onward, ahead = _exponential(exponent[k], interval), 1.0 + 0j
-        for later in range(SAMPLES_AT_ONCE):
-            for i in range(count):
-                o = seen[i]
-                value = ahead * row[o, k]
-                real[later * n_output + o] = value.real
-                imaginary[later * n_output + o] = -value.imag
-            ahead *= onward
+    for a in range(re.shape[0]):
+        real, imaginary = 0.0, 0.0
+        for k in range(shares.shape[1]):
+            real += shares[0, k] * re[a, k] + shares[2, k] * im[a, k]
+            imaginary += shares[1, k] * re[a, k] + shares[3, k] * im[a, k]
+        moved[0, a], moved[1, a] = real, imaginary
 
 
-@jit
-def _exponential(exponent: complex, time: float) -> complex:
-    """Exponential over a time, s, in a quarter of the time of one that looks for infinite arguments."""
-    size, turn = np.exp(exponent.real * time), exponent.imag * time
-    return complex(size * np.cos(turn), size * np.sin(turn))
+@jit_lean_sum
+def _look(rows: Floats, moved: Floats, seen: Floats) -> None:
+    """What r rows (r, c) see of a response (2, c), real and imaginary part."""
+    for i in range(rows.shape[0]):
+        real, imaginary = 0.0, 0.0
+        for a in range(rows.shape[1]):
+            real += rows[i, a] * moved[0, a]
+            imaginary += rows[i, a] * moved[1, a]
+        seen[0, i], seen[1, i] = real, imaginary
 
 
 @jit

@@ -84,6 +84,10 @@ def vary(tables: ModeTables, mode: int, varying: Varying, place: float, rise: fl
 @jit
 def vary_rates(tables: ModeTables, mode: int, exponent: Complexes, n_eigenmode: int) -> None:
     """Rates of what eigenmodes make of switch functions and slip, as their exponents are."""
+    inverse = np.zeros(n_eigenmode if tables.primitive_re.shape[1] > 0 else 0, dtype=np.complex128)
+    for k in range(inverse.size):
+        if abs(exponent[k]) > STILL:
+            inverse[k] = 1.0 / exponent[k]
     for i in range(tables.switch_re.shape[1]):
         for k in range(n_eigenmode):
             rate = complex(tables.switch_re[mode, i, k], tables.switch_im[mode, i, k]) * exponent[k]
@@ -92,8 +96,7 @@ def vary_rates(tables: ModeTables, mode: int, exponent: Complexes, n_eigenmode: 
                 rate = rate * exponent[k]
                 tables.bend_re[mode, i, k], tables.bend_im[mode, i, k] = rate.real, rate.imag
             if i < tables.primitive_re.shape[1]:
-                switch = complex(tables.switch_re[mode, i, k], tables.switch_im[mode, i, k])
-                whole = switch / exponent[k] if abs(exponent[k]) > STILL else 0j
+                whole = complex(tables.switch_re[mode, i, k], tables.switch_im[mode, i, k]) * inverse[k]
                 tables.primitive_re[mode, i, k], tables.primitive_im[mode, i, k] = whole.real, whole.imag
     for i in range(tables.slip_re.shape[1]):
         for k in range(n_eigenmode):

@@ -36,13 +36,18 @@ class Eigenmodes(NamedTuple):
         for course in (varying.kept_shape, varying.kept_entry):
             take_course(course, within, rise, varying.kept)
         constant = taken(varying.enter_constant, row.enter_constant[0], within, rise)[:, :, :m]
-        enter_re = taken(varying.enter_re, row.enter_re[0], within, rise)[:, :m]
-        enter_im = taken(varying.enter_im, row.enter_im[0], within, rise)[:, :m]
+        motion, enter = (
+            taken(re, re_of[0], within, rise)[:, :m] + 1j * taken(im, im_of[0], within, rise)[:, :m]
+            for re, im, re_of, im_of in (
+                (varying.motion_re, varying.motion_im, row.motion_re, row.motion_im),
+                (varying.enter_re, varying.enter_im, row.enter_re, row.enter_im),
+            )
+        )
         return cls(
             exponent=held.exponent[:m].copy(),
             is_pair=held.is_pair,
-            motion=held.motion.T.copy(),
-            enter=(enter_re + 1j * enter_im).T,
+            motion=motion,
+            enter=enter.T,
             constant=constant[:, 0] + 1j * constant[:, 1],
             drive=held.drive.copy(),
             mirrored_drive=held.mirrored_drive.copy(),

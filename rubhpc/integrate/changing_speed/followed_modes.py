@@ -45,7 +45,7 @@ STILL, LEAST = 1e-13, 1e-16  # change of an entry over it, and over the greatest
 NONE = Course(np.zeros(0, dtype=np.int64), np.zeros((1, 0)), np.zeros(0))
 NOTHING = Varying(np.zeros(0), *[NONE] * (len(Varying._fields) - 1))
 _TABLES = "motion", "switch", "slip"
-_HELD = "exponent", "motion", "switch", "output", "row"
+_HELD = "exponent", "switch", "output", "row"
 _OF_RIM = "motion", "switch", "fixed", "rate", "row"
 _RIM = "rim "
 

@@ -137,7 +137,6 @@ def held_mode(
         n_coordinate=end,
         exponent=exponent,
         is_pair=doubled > 1.5,
-        motion=np.ascontiguousarray(mode.motion[:, :m].T),
         drive=enter[:, n:] @ linear.seen,
         mirrored_drive=enter[:, n:].conj() @ linear.seen,
         switch=linear.switch,

@@ -11,7 +11,7 @@ import numpy as np
 from rubhpc.integrate.changing_speed.followed_modes import between
 from rubhpc.integrate.changing_speed.retuned_curved import RetunedCurvedLibrary
 from rubhpc.integrate.changing_speed.retuned_laws import RetunedFrictionLibrary, RetunedPenaltyLibrary
-from rubhpc.integrate.changing_speed.retuned_modes import Desk, RetunedLibrary
+from rubhpc.integrate.changing_speed.retuned_modes import AT_ONCE, Desk, RetunedLibrary
 from rubhpc.integrate.changing_speed.retuned_soft_friction import RetunedSoftFrictionLibrary
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.reduced_model.penalty_mode import Penalty
@@ -50,6 +50,7 @@ class HeldMatrices:
 
     template: PieceSetup  # set-up to copy for the speed of a piece
     is_balanced = True  # whether energies are requested
+    at_once = AT_ONCE  # pieces that are integrated together, at most
 
     def __init__(
         self,
@@ -84,8 +85,13 @@ class HeldMatrices:
 
     @property
     def n_byte(self) -> int:
-        """Memory of the tables of contact modes, bytes."""
-        return sum(library.n_byte for library in self._libraries.values())
+        """Memory of the tables of contact modes and of kept parts, bytes."""
+        return self.kept.n_byte + sum(library.n_byte for library in self._libraries.values())
+
+    def forget(self) -> None:
+        """Free contact modes, which would wait for a garbage collection: libraries refer to this object."""
+        self._libraries.clear()
+        self.kept, self.first = KeptParts(), None
 
     def serve(self, speed: float, acceleration: float, slope: float = 0.0) -> bool:
         """Whether a piece may use them."""
@@ -176,6 +182,7 @@ class HeldMatrices:
                 at_place=self.at_place,
                 risen=self.risen,
                 is_balanced=self.is_balanced,
+                at_once=self.at_once,
                 **make(),
             )
         library = self._libraries[key]

@@ -29,6 +29,7 @@ SAGGING_AT_ONCE = 8  # pieces taken together where their sag, one for all, follo
 LEAST_GROWTH = 1e-5  # of the unbalance force in a piece
 MOST_HELD = 4  # matrices at hand, of a spin that swings between them
 MOST_BYTES = 3 * 2**29  # of contact modes that are kept, with their matrices, for other cases
+MOST_DRIVEN_BYTES = 2**27  # the same of a free spin, whose cases have few speeds in common
 
 # Of each set-up, the matrices by speed, acceleration, slope of the torque and the accelerations to come, the
 # latest last, for other cases too.
@@ -37,24 +38,14 @@ _KNOWN: WeakKeyDictionary[ModalSetup, dict[tuple[object, ...], HeldMatrices]] = 
 _RIPPLES: WeakKeyDictionary[ModalSetup, Ripples] = WeakKeyDictionary()
 
 
-def forget_most() -> None:
-    """Forget matrices whose contact modes take more memory than is to be kept, those used long ago first."""
-    for known in _KNOWN.values():
-        n_byte = 0
-        for key in reversed(list(known)):
-            n_byte += known[key].n_byte
-            if n_byte > MOST_BYTES:
-                del known[key]
-
-
 class Pieces:
     """The set-ups of the pieces of a run-up, from that at its highest speed, which keeps the most modes."""
 
     def __init__(self, fastest: ModalSetup) -> None:
-        forget_most()
         self._fastest = fastest
         self._ranges = SpeedRanges(fastest)
         self._held: list[HeldMatrices] = []  # the latest first
+        self._used: set[tuple[object, ...]] = set()  # those of `_KNOWN` that this case has used
 
     @property
     def ripples(self) -> Ripples:
@@ -146,9 +137,29 @@ class Pieces:
         known = _KNOWN.setdefault(self._fastest, {})
         asked = speed, acceleration, slope, self._ranges.accelerations
         found = known.pop(asked, None) or self._ranges.hold(speed, acceleration, slope)
-        known[asked] = found
-        self._held = [found, *self._held[: MOST_HELD - 1]]
+        if self._make_room(known):
+            known[asked] = found
+            self._used.add(asked)
+        self._held.insert(0, found)
+        for left in self._held[MOST_HELD:]:
+            if left not in known.values():
+                left.forget()
+        del self._held[MOST_HELD:]
         return found
+
+    def _make_room(self, known: dict[tuple[object, ...], HeldMatrices]) -> bool:
+        """Forget matrices that this case has not used, the earliest first; whether more may be kept.
+
+        The next case begins with those that this one has used first.
+        """
+        most = MOST_BYTES if self._fastest.free_spin is None else MOST_DRIVEN_BYTES
+        n_byte = sum(held.n_byte for held in known.values())
+        for key in [key for key in known if key not in self._used]:
+            if n_byte <= most:
+                break
+            n_byte -= (left := known.pop(key)).n_byte
+            left.forget()
+        return n_byte <= most
 
 
 def growth_of(speed: Floats, acceleration: Floats, duration: Floats) -> Floats:

@@ -34,17 +34,14 @@ class RetunedCurvedLibrary(RetunedLibrary, CurvedLibrary):
     `at_piece` gives the reduced model at the speed of the piece at hand.
     """
 
-    at_once = 1  # the tables of curved gaps are larger, and are made piece by piece
-
     def __init__(self, *args: Any, at_piece: Callable[[], ReducedModel], **keys: Any) -> None:
         """Start with every pair open."""
         self._row, self._curved = motion_rows(args[0], args[1]), None
         self._at_piece = at_piece
         self._still: dict[int, StillParts] = {}  # by set of closed pairs
         self._n_curved, self._n_step = 0, steps_of(keys["tick"], keys["n_level"]).size
-        super().__init__(
-            *args, **keys | {"desks": None}
-        )  # its own: tables of curved gaps stay where they are
+        # Its own desk: tables of curved gaps stay where they are. They are larger, and made piece by piece.
+        super().__init__(*args, **keys | {"desks": None, "at_once": 1})
 
     def add(self, mask: int) -> bool:
         """Tune the mode with these pairs closed; returns whether the tables are wide enough for it."""

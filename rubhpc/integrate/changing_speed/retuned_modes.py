@@ -36,7 +36,7 @@ from rubhpc.kernels.retuning_laws import Springs
 
 NOT_TUNED = -2  # in place of a set of closed pairs: a contact mode that this piece has not met
 AT_ONCE = 16  # pieces to whose speeds a contact mode is tuned at once
-MOST_BYTES = 2**23  # of its tables for so many pieces; where they are more, pieces take turns in one
+MOST_BYTES = 2**23  # of its tables for so many pieces; where they are more, it is tuned to fewer at once
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -87,9 +87,10 @@ class RetunedLibrary(ModeLibrary):
         The same in the middle of the range at another acceleration, with which modes go evenly.
     is_balanced : bool
         Whether energies are asked for, which stand in no table of modes that follow the speed.
+    at_once : int
+        Pieces to whose speeds a contact mode is tuned at once, at most.
     """
 
-    at_once = AT_ONCE
     _n_ahead = 0  # outputs are filled in for each speed
 
     def __init__(
@@ -108,10 +109,11 @@ class RetunedLibrary(ModeLibrary):
         at_place: Callable[[float, float], ReducedModel] | None = None,
         risen: ReducedModel | None = None,
         is_balanced: bool = True,
+        at_once: int = AT_ONCE,
     ) -> None:
         """Start with every pair open."""
         self.reduced, self._known = reduced, known
-        self._is_measured, self._at_place = is_balanced, at_place
+        self._is_measured, self._at_place, self._at_once = is_balanced, at_place, at_once
         self.gap_jacobian, self.force_direction, self.slip = directions(reduced, model, friction)
         self._tick, self._sample_level, self._n_level = tick, sample_level, n_level
         self._phasor, self._output = phasor, np.hstack(output_operators(reduced))
@@ -139,6 +141,7 @@ class RetunedLibrary(ModeLibrary):
             [reduced.spin], [complex(reduced.spin**2)], [0.0], [tick], reduced.spin, sample_level
         )
         self._at = 0  # piece among those at hand
+        self._window = 0  # the first of the pieces for which there are tables
         self.masks: list[int] = []
         self._take_desk()
         self.add(0)
@@ -170,6 +173,11 @@ class RetunedLibrary(ModeLibrary):
         return self._tables.n_most // max(1, self.n_room)
 
     @property
+    def window_end(self) -> int:
+        """The piece, of those at hand, from which on tables are tuned anew."""
+        return self._window + self.n_room
+
+    @property
     def is_full(self) -> bool:
         """Whether there is no room for another contact mode."""
         return len(self._held) >= self.n_most
@@ -196,6 +204,9 @@ class RetunedLibrary(ModeLibrary):
     def reach(self, piece: int) -> None:
         """Go on to a later piece of those at hand, with no mode, though some may be tuned already."""
         self._at = piece
+        window = piece - piece % max(1, self.n_room)
+        if window != self._window:
+            self._window, self._tuned = window, {}
         self.masks = [NOT_TUNED] * len(self.masks)
         self.tables().mask[:] = NOT_TUNED
 
@@ -205,10 +216,10 @@ class RetunedLibrary(ModeLibrary):
             return False
         if mask not in self._place:
             self._put(mask)
-        first, at, speeds = self._place[mask], self._at, self._speeds
-        place = first + (at if self.n_room > 1 else 0)
+        at, speeds = self._at, self._speeds
+        place = self._place[mask] + at - self._window
         if self._tuned.get(mask, 0) <= at:
-            end = min(speeds.spin.size, self.n_room) if self.n_room > 1 else at + 1
+            end = min(speeds.spin.size, self.window_end)
             if mask in self._strange:
                 self._solve_at(mask, place, float(speeds.within[at]), float(speeds.rise[at]))
                 end = at + 1
@@ -234,8 +245,9 @@ class RetunedLibrary(ModeLibrary):
     def tuned(self, met: set[int]) -> Ints:
         """Sets of closed pairs of the tables that are tuned to this piece or to later ones, of those met."""
         found = np.full(len(self.masks), NOT_TUNED)
-        for mask, first in self._place.items():
+        for mask, place in self._place.items():
             if mask in met:
+                first = place - self._window
                 found[first + self._at : first + self._tuned.get(mask, 0)] = mask
         return found
 
@@ -310,12 +322,18 @@ class RetunedLibrary(ModeLibrary):
     def _put(self, mask: int) -> None:
         """Put a mode on the desk."""
         row, place = self._held[mask][0], len(self.masks)
-        is_small = self.at_once * sum(field.nbytes for field in row) <= MOST_BYTES
-        self.n_room = self.n_room or (self.at_once if is_small else 1)
+        self.n_room = self.n_room or self._n_room_of(sum(field.nbytes for field in row))
         self._place[mask] = place
         self._tables.add(row, self.n_room)
         self.masks += [NOT_TUNED] * self.n_room
         self.tables().mask[place:] = NOT_TUNED
+
+    def _n_room_of(self, n_byte: int) -> int:
+        """Pieces to which a mode is tuned at once, a power of two, by the memory of its tables for one."""
+        found = self._at_once
+        while found > 1 and found * n_byte > MOST_BYTES:
+            found //= 2
+        return found
 
     def forget(self) -> None:
         """Make room: keep no mode but that with every pair open."""

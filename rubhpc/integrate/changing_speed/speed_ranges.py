@@ -99,6 +99,8 @@ class SpeedRanges:
             model, reduced, self.phasor, self._momentum, *at, slowest.sample_level, desks, beside, judge
         )
         held.is_balanced = not is_followed
+        if free is not None:
+            held.at_once = 1  # the speed after a piece follows from its energies
         if beside and fastest.model.rotor.tabulated_speeds:
             held.sags = [model.sag, *(other.sag for other, _ in beside)]
         held.template = PieceSetup(

@@ -81,18 +81,18 @@ def take_stretch(
     begun, earlier
         As in `Passing.take`.
     """
-    speeds, n_piece, model = block.speeds, len(block), block.model
+    speeds, n_piece, model = block.speeds, min(len(block), library.window_end), block.model
     n_row, n_sample = samples.whole.shape
     part = min(n_sample, block.held.template.samples_per_revolution)
     n_part = n_sample // part
     q, n = march.bodies.gap_jacobian.shape
     lasts = n_sample * speeds.interval
     pieces = Pieces(
-        spin=speeds.spin,
-        growth=speeds.growth,
-        tick=speeds.tick,
-        search_level=block.search_level,
-        force=block.force,
+        spin=speeds.spin[:n_piece],
+        growth=speeds.growth[:n_piece],
+        tick=speeds.tick[:n_piece],
+        search_level=block.search_level[:n_piece],
+        force=block.force[:n_piece],
         since=np.array([earlier[1] if i == first else lasts[i - 1] for i in range(n_piece)]),
         table=library.tuned(march.met),
         n_room=library.n_room,

@@ -1,0 +1,48 @@
+"""Memory of the matrices of a run-up or drive is bounded, however many ranges of speed it passes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from overhung_pump import pump
+from test_run_up_machines import TIPS
+
+from rubhpc import run_up
+from rubhpc.integrate.changing_speed import pieces, speed_ranges
+
+DRIVE = {"torque": "60 N m", "start": "300 rad/s", "revolutions": 5, "inertia": "0.02 kg m^2"}
+BENDS = {"speed_law": [(0.0, 300.0), (0.05, 310.0), (0.07, 330.0), (0.12, 334.0)]}
+
+
+@pytest.mark.parametrize(
+    ("motion", "budget"),
+    [({"drive": DRIVE}, "MOST_DRIVEN_BYTES"), (BENDS, "MOST_BYTES")],
+    ids=["drive", "run-up"],
+)
+def test_memory_of_many_ranges_is_bounded(motion, budget, monkeypatch):
+    rig, made, hold = replace(pump(), stator=TIPS), [], speed_ranges.SpeedRanges.hold
+
+    def noted(*args):
+        made.append(hold(*args))
+        return made[-1]
+
+    def n_byte():
+        return sum(held.n_byte for held in made)
+
+    monkeypatch.setattr(speed_ranges.SpeedRanges, "hold", noted)
+    monkeypatch.setattr(speed_ranges, "WIDEST", 0.005)  # narrow ranges
+    case = motion | {"clearance": 1e-4, "friction": 0.05, "samples_per_revolution": 64}
+    pieces._KNOWN.clear()
+    first, of_all = run_up(rig, **case), n_byte()
+    greatest = max(held.n_byte for held in made)
+    again, n_made = run_up(rig, **case), len(made)
+    assert n_made > 1 + pieces.MOST_HELD
+    most = of_all // 8
+    assert most + 2 * greatest < 0.7 * of_all
+    monkeypatch.setattr(pieces, budget, most)
+    monkeypatch.setattr(pieces, "MOST_HELD", 1)
+    found = run_up(rig, **case)
+    assert n_byte() <= most + 2 * greatest
+    for other in (again, found):
+        for name in ("vertical", "torsion", "speed"):
+            assert np.array_equal(other[name].values, first[name].values), name
