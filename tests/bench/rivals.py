@@ -6,6 +6,7 @@ The first two follow Eqs. 20 to 24 of the paper, dense over both bodies together
 import math
 import time
 from dataclasses import dataclass
+from importlib.util import find_spec
 
 import numba
 import numpy as np
@@ -90,22 +91,11 @@ def run(rig, speed, clearance, friction, n_step, *, step, is_compiled):
     return (time.perf_counter() - began) / n_step, vertical
 
 
-def ross_rubbing(rig, speed, clearance, friction, duration, step):
-    """Wall time (s) of ROSS's rubbing fault over `duration` (s); None where ROSS is not installed.
+def ross_rotor(rig):
+    """The rotor of a rig with one shaft section and one disc, as ROSS has it."""
+    import ross
 
-    Penalty contact all around at one node against a rigid housing; its friction is not Coulomb's. No
-    flexible stator, no sweeps.
-    """
-    try:
-        import ross
-    except ImportError:
-        return None
-    (section,), (disc,), (unbalance,), stator = (
-        rig.rotor.shaft,
-        rig.rotor.disc,
-        rig.rotor.unbalance,
-        rig.stator[0],
-    )
+    (section,), (disc,) = rig.rotor.shaft, rig.rotor.disc
     steel = ross.Material(
         name="shaft", rho=section.density, E=section.youngs_modulus, G_s=section.shear_modulus
     )
@@ -119,7 +109,18 @@ def ross_rubbing(rig, speed, clearance, friction, duration, step):
     bearings = [
         ross.BearingElement(b.node - 1, kxx=b.stiffness, kyy=b.stiffness, cxx=0.0) for b in rig.rotor.bearing
     ]
-    rotor = ross.Rotor(shaft, [disk], bearings)
+    return ross.Rotor(shaft, [disk], bearings)
+
+
+def ross_rubbing(rig, speed, clearance, friction, duration, step):
+    """Wall time (s) of ROSS's rubbing fault over `duration` (s); None where ROSS is not installed.
+
+    Penalty contact all around at one node against a rigid housing; its friction is not Coulomb's. No
+    flexible stator, no sweeps.
+    """
+    if find_spec("ross") is None:
+        return None
+    rotor, (disc,), (unbalance,), stator = ross_rotor(rig), rig.rotor.disc, rig.rotor.unbalance, rig.stator[0]
     began = time.perf_counter()
     rotor.run_rubbing(
         n=disc.node - 1,
