@@ -7,6 +7,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from rubhpc.rig.probes import Probe
+from rubhpc.schema import WAVEFORM
 from rubhpc.study.contact_keys import Contact
 from rubhpc.study.drive_keys import DriveKeys
 from rubhpc.study.run_up_keys import RunUpKeys
@@ -35,6 +36,8 @@ def setting_rows(study: dict[str, Any]) -> list[tuple[str, str]]:
         settings = study.get(table)
         if isinstance(settings, dict):
             shown = {k: v for k, v in settings.items() if table != "record" or k not in unused}
+            if table == "record" and unused and isinstance(shown.get("keep"), list):
+                shown["keep"] = [name for name in shown["keep"] if name == WAVEFORM]
             rows.append((table.replace("_", "-").capitalize(), _text(table, shown)))
     return rows
 

@@ -17,7 +17,7 @@ def test_numbers_have_the_units_of_their_keys():
         "record": {
             "revolutions": 64,
             "samples_per_revolution": 128,
-            "keep": ["waveform", "section"],
+            "keep": ["waveform", "spectrum", "section"],
             "probe": [probe],
         },
     }
@@ -25,7 +25,7 @@ def test_numbers_have_the_units_of_their_keys():
         "Run-up": "start 1200 rpm, time 20 s",
         "Contact": "law penalty, stiffness 400 kN m⁻¹, damping 30 N s/m",
         "Integrator": "method modal, step 2 µs",
-        "Record": "samples per revolution 128, keep waveform and section, "
+        "Record": "samples per revolution 128, keep waveform, "
         "probe (name left, node 1, angle -45°, quantity displacement)",
     }
 
@@ -33,6 +33,11 @@ def test_numbers_have_the_units_of_their_keys():
 def test_a_law_of_speed_is_read_point_by_point():
     law = [[0.0, 31.41592653589793], [10.0, 314.1592653589793]]
     assert setting_rows({"run_up": {"law": law}}) == [("Run-up", "law 300 rpm at 0 s and 3000 rpm at 10 s")]
+
+
+def test_a_study_at_constant_speeds_keeps_what_it_says():
+    record = {"revolutions": 64, "keep": ["waveform", "spectrum"]}
+    assert setting_rows({"record": record}) == [("Record", "revolutions 64, keep waveform and spectrum")]
 
 
 def test_every_table_that_a_store_holds_is_read():
