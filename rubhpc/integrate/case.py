@@ -11,16 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.integrate.ahead import compile_ahead
-from rubhpc.integrate.closed_form_case import (
-    exponents_of,
-    give_back,
-    neighbours_of,
-    solver_of,
-    trail_of,
-)
+from rubhpc.integrate.closed_form_case import exponents_of, give_back, judge_of, trail_of
 from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.integrate.initial_state import fit_to_gaps, with_overlap
-from rubhpc.integrate.lyapunov import Growth
+from rubhpc.integrate.marched_record import Marched, march_record
 from rubhpc.integrate.marches.central_difference import CentralDifferenceMarch
 from rubhpc.integrate.marches.closed_form import closed_form_march
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
@@ -33,8 +27,6 @@ from rubhpc.integrate.measuring.measures import measures_of
 from rubhpc.integrate.measuring.samples import (
     add_sag,
     by_name,
-    empty_samples,
-    new_accumulator,
     probe_extents,
     samples_within,
 )
@@ -44,6 +36,7 @@ from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.periodic_motions.proof import Solver
 from rubhpc.integrate.periodic_motions.shared_motions import shared_motions
 from rubhpc.integrate.record import Record, State
+from rubhpc.integrate.repeated_record import KnownMotion, repeat_period
 from rubhpc.integrate.scheme import Scheme
 from rubhpc.integrate.start import start_of
 from rubhpc.integrate.transient import pass_revolutions, pass_transient
@@ -58,10 +51,10 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.model import Model
     from rubhpc.integrate.marches.march import March
-    from rubhpc.integrate.periodic_motions.shooting import Orbit
     from rubhpc.integrate.periodic_motions.walk import Passed
     from rubhpc.integrate.setup import Setup
     from rubhpc.kernels.accumulators import Samples
+    from rubhpc.kernels.trail import Trail
     from rubhpc.study.study import Recording
 
     Floats = NDArray[np.float64]
@@ -158,57 +151,60 @@ def _integrate(
     clearance: float,
     friction: float,
     recording: Recording,
+    motion: KnownMotion | None = None,
 ) -> Record:
-    """March through transient and record, then measure."""
+    """March through transient and record, then measure; a `motion` is one on which the case begins."""
     march = start(initial)
     n_step = n_left = 0
     per_revolution = setup.samples_per_revolution
-    n_stator = len(setup.model.stators)
-    n_sample = recording.revolutions * per_revolution
-    samples = empty_samples(march.n_place, n_sample, setup.model.n_probe)
-    accumulator = new_accumulator(n_stator, march.n_place)
     settings = {"spin_speed": setup.spin, "clearance": clearance}
-
     begin = partial(_solve_from, setup, clearance, friction)
-    begun_on: tuple[PiecewiseMotion, Orbit] | None = None
     if recording.is_transient_direct and isinstance(march, EventDrivenMarch) and march.has_closed_form:
         passed, record = _pass_directly(march, start, begin, initial, setup, clearance, friction, recording)
         if record is not None:
             return record
         march, reason, n_transient, n_step = passed.march, passed.reason, passed.n_revolution, passed.n_step
-        begun_on = passed.found
+        motion = None if passed.found is None else KnownMotion.of(passed.found[1])
     else:
         reason, n_transient = pass_transient(march, recording)
+    marched: Marched | None = None
+    trail: Trail | None = None
     if reason is not None:  # the record shows the way to divergence
         n_step, n_left = n_step + march.n_step, march.n_left
         ended = n_transient + march.sample // per_revolution + 1
         march, n_transient = start(initial), max(0, ended - recording.revolutions)
-        if pass_revolutions(march, recording, n_transient) is None:
-            march.advance(0, n_sample, samples, accumulator, is_recorded=True)
-    else:
-        energy_before = march.energy()
-        accumulator.is_touching[:] = march.touching()  # a contact under way did not begin in the record
+        is_short = pass_revolutions(march, recording, n_transient) is not None
+        marched = march_record(march, setup, 0 if is_short else recording.revolutions)
+    elif motion is not None:
+        assert isinstance(march, EventDrivenMarch)
+        marched, n_lost = repeat_period(march, motion.period, recording.revolutions)
+        n_step += n_lost
+        motion = motion if marched is not None else None
+    if marched is None:
         trail = trail_of(march, recording)
-        reason = march.advance(0, n_sample, samples, accumulator, is_recorded=True)
+        marched = march_record(march, setup, recording.revolutions)
+        reason = marched.reason
     n_step, n_left = n_step + march.n_step, n_left + march.n_left
+    samples, accumulator, final = marched.samples, marched.accumulator, marched.final
+    add_sag(samples, accumulator, setup.model)
     if reason is not None:
         n_kept = samples_within(samples, march.sample, setup.displacement_limit)
         revolution = n_transient + min(n_kept // per_revolution + 1, recording.revolutions)
-        add_sag(samples, accumulator, setup.model)
         record = diverged_record(
             f"{reason} in revolution {revolution}",
-            n_stator,
+            len(setup.model.stators),
             recording,
             settings,
-            march.final(),
+            final,
             by_name(samples.whole[:, :n_kept], setup.model),
         )
     else:
-        add_sag(samples, accumulator, setup.model)
-        signals, final = by_name(samples.whole, setup.model), march.final()
-        energy = energy_before, march.energy()
-        solver = solver_of(march, setup, clearance, friction, final, begun_on)
-        growth = Growth(lambda: neighbours_of(march, trail, start, final, setup, recording))
+        signals = by_name(samples.whole, setup.model)
+        judge = (
+            judge_of(march, start, setup, clearance, friction, recording, final, trail)
+            if motion is None
+            else motion.judge
+        )
         record = Record(
             status=DONE,
             samples_per_revolution=per_revolution,
@@ -221,16 +217,12 @@ def _integrate(
                 accumulator,
                 signals,
                 deflection=tip_deflection(samples, accumulator, setup.model),
-                energy=energy,
+                energy=marched.energy,
                 stators=setup.model.stators,
                 spin=setup.spin,
                 is_round=setup.is_updated,
                 samples_per_revolution=per_revolution,
-                growth=growth,
-                within=growth.within,
-                solve=solver,
-                later=solver.later if solver is not None else None,
-                n_event=trail.n_event[0] / recording.revolutions if trail is not None else 0.0,
+                judge=judge,
             )
             | {"carrier_displacement": carrier_displacement(samples, setup.model)}
             | probe_extents(signals),
@@ -272,8 +264,11 @@ def _pass_directly(
         return passed, None
     at_once = replace(recording, transient=0, transient_limit=None, transient_tolerance=None)
 
+    place = known.place(passed.reached)
+
     def begun_at(state: State) -> Record:
-        record = _integrate(start, state, setup, clearance, friction, at_once)
+        motion = KnownMotion(place.period, place.multiplier)
+        record = _integrate(start, state, setup, clearance, friction, at_once, motion)
         return replace(record, final=with_overlap(record.final, setup, clearance))
 
     record = known.record(passed.reached, begun_at).copied()

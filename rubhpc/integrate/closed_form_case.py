@@ -6,9 +6,10 @@ import math
 from functools import partial
 from typing import TYPE_CHECKING, cast
 
-from rubhpc.integrate.lyapunov import Marches
+from rubhpc.integrate.lyapunov import Growth, Marches
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
-from rubhpc.integrate.measuring.regimes import LEAST_REVOLUTIONS
+from rubhpc.integrate.measuring.orbit_measures import period
+from rubhpc.integrate.measuring.regimes import LEAST_REVOLUTIONS, regime
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.periodic_motions.lyapunov_spectrum import spectrum_of
 from rubhpc.integrate.periodic_motions.proof import Solver
@@ -18,14 +19,20 @@ from rubhpc.schema import lyapunov_variables
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    import numpy as np
+    from numpy.typing import NDArray
+
     from rubhpc.integrate.lyapunov import Neighbours
     from rubhpc.integrate.marches.march import March
+    from rubhpc.integrate.measuring.measures import Judge
+    from rubhpc.integrate.measuring.regimes import Verdict
     from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
-    from rubhpc.integrate.periodic_motions.shooting import Orbit
     from rubhpc.integrate.record import State
     from rubhpc.integrate.setup import Setup
     from rubhpc.kernels.trail import Trail
     from rubhpc.study.study import Recording
+
+    Floats = NDArray[np.float64]
 
 _spare: list[Trail] = []  # arrays of the last case, unless another one uses them
 
@@ -41,17 +48,47 @@ def exponents_of(
     return dict.fromkeys(lyapunov_variables(n_exponent), math.nan)
 
 
+def judge_of(
+    march: March,
+    start: Callable[[State], March],
+    setup: Setup,
+    clearance: float,
+    friction: float,
+    recording: Recording,
+    final: State,
+    trail: Trail | None,
+) -> Judge:
+    """What judges a simulated record: its orbit, neighbouring motions and periodic ones."""
+    solver = solver_of(march, setup, clearance, friction, final)
+    growth = Growth(lambda: neighbours_of(march, trail, start, final, setup, recording))
+
+    def judge(vertical: Floats, horizontal: Floats, per_revolution: int, is_contact: bool) -> Verdict:
+        return regime(
+            vertical,
+            horizontal,
+            per_revolution,
+            period=period(vertical, horizontal, per_revolution),
+            is_contact=is_contact,
+            growth=growth,
+            within=growth.within,
+            solve=solver,
+            later=solver.later if solver is not None else None,
+            n_event=trail.n_event[0] / recording.revolutions if trail is not None else 0.0,
+        )
+
+    return judge
+
+
 def solver_of(
     march: March,
     setup: Setup,
     clearance: float,
     friction: float,
     final: State,
-    begun_on: tuple[PiecewiseMotion, Orbit] | None,
 ) -> Solver | None:
     """Solver for periodic motions near the end of a march; None where it has no closed form."""
     if isinstance(march, EventDrivenMarch) and march.has_closed_form and isinstance(setup, ModalSetup):
-        return Solver(setup, clearance, friction, final, begun_on, march)
+        return Solver(setup, clearance, friction, final, march)
     return None
 
 

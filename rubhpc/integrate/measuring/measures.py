@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rubhpc.integrate.measuring.orbit_measures import period, whirl_ratio
-from rubhpc.integrate.measuring.regimes import regime
+from rubhpc.integrate.measuring.orbit_measures import whirl_ratio
 from rubhpc.integrate.measuring.settling import settled
 from rubhpc.kernels.accumulators import (
     DAMPING_LOSS,
@@ -23,14 +22,15 @@ from rubhpc.kernels.accumulators import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable
 
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import StatorModel
-    from rubhpc.integrate.measuring.regimes import Later, Solution, Within
+    from rubhpc.integrate.measuring.regimes import Verdict
 
     Floats = NDArray[np.float64]
+    Judge = Callable[[Floats, Floats, int, bool], Verdict]
 
 
 LEAST_EXCHANGE = 1e-6  # of the mechanical energy: least reference of the energy residual
@@ -46,11 +46,7 @@ def measures_of(
     spin: float,
     is_round: bool,
     samples_per_revolution: int,
-    growth: Iterable[float],
-    within: Within | None,
-    solve: Callable[[int], Solution | None] | None,
-    later: Later | None,
-    n_event: float,
+    judge: Judge,
 ) -> dict[str, Any]:
     """Measures of a finished case; those of a contact that never happened are zero, or NaN where undefined.
 
@@ -63,16 +59,8 @@ def measures_of(
     spin : float, rad/s
     is_round : bool
         Whether the gap includes the roundness of the rim (updated normal).
-    growth : iterable of float
-        Growth of a small displacement after the record (`lyapunov.Growth`); read where it decides the regime.
-    within : callable, optional
-        Growth within the record (`lyapunov.Growth.within`).
-    solve : callable, optional
-        Finds periodic motions (`proof.Solver`).
-    later : callable, optional
-        Finds them in later revolutions, where `solve` does not (`proof.Solver.later`).
-    n_event : float
-        Events in a revolution, where they are known; else 0.
+    judge : callable
+        Judges the orbit: `regimes.regime`, or `regimes.known_regime` of a motion that was solved for.
     """
     n_sample = signals["vertical"].size
     n_revolution = n_sample // samples_per_revolution
@@ -81,19 +69,8 @@ def measures_of(
     is_contact = bool(has_touched.any())
     n_contact = np.maximum(accumulator.n_contact, 1)  # a permanent contact does not begin in the record
     orbit = signals["vertical"], signals["horizontal"], samples_per_revolution
-    verdict = regime(
-        *orbit,
-        period=period(*orbit),
-        is_contact=is_contact,
-        growth=growth,
-        solve=solve,
-        within=within,
-        later=later,
-        n_event=n_event,
-    )
+    verdict = judge(*orbit, is_contact)
     multiplier = verdict.multiplier
-    rim = stators[0].radius * signals["torsion"]  # m, as the orbit
-    force = signals["contact_force"].reshape(len(stators), n_revolution, samples_per_revolution)
     # Drive and friction exchange a hundred times the energy that reaches the vibration, and for a rotor that
     # stands nothing else: only their difference counts.
     flows = [
@@ -135,18 +112,27 @@ def measures_of(
         "peak_to_peak_vertical": float(accumulator.highest[VERTICAL] - accumulator.lowest[VERTICAL]),
         "peak_to_peak_horizontal": float(accumulator.highest[HORIZONTAL] - accumulator.lowest[HORIZONTAL]),
         "energy_residual": float(abs(sum(flows) - (energy[1] - energy[0])) / exchanged),
-        "settled": settled(
-            np.stack([*orbit[:2], rim]),
-            force.mean(axis=2),
-            samples_per_revolution,
-            period=verdict.period,
-            is_contact=is_contact,
-        )
-        if verdict.is_reached
-        else 0,
+        "settled": _settled(verdict, signals, stators[0].radius, samples_per_revolution, is_contact),
         "contact_iterations": int(accumulator.pivots[0]),
         "contact_residual": float(np.divide(distance, moved, out=np.zeros(3), where=moved > 0.0).max()),
     }
+
+
+def _settled(
+    verdict: Verdict, signals: dict[str, Floats], radius: float, samples_per_revolution: int, is_contact: bool
+) -> int:
+    """Flag of `schema.SETTLED`; `radius` (m) is that of the rim."""
+    if verdict.repeats or not verdict.is_reached:
+        return int(verdict.repeats)
+    rim = radius * signals["torsion"]  # m, as the orbit
+    force = signals["contact_force"].reshape(len(signals["contact_force"]), -1, samples_per_revolution)
+    return settled(
+        np.stack([signals["vertical"], signals["horizontal"], rim]),
+        force.mean(axis=2),
+        samples_per_revolution,
+        period=verdict.period,
+        is_contact=is_contact,
+    )
 
 
 def foreshortening_ratio(

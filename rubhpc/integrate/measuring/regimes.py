@@ -54,6 +54,7 @@ class Verdict(NamedTuple):
     exponent: float = math.nan  # largest Lyapunov exponent per revolution, where it was measured
     multiplier: complex = complex(math.nan, math.nan)  # largest, where the periodic motion was solved for
     is_reached: bool = True  # false where the record has not settled on it
+    repeats: bool = False  # the record is that of the motion itself
 
 
 def regime(
@@ -137,6 +138,18 @@ def regime(
     return Verdict(flag, period if is_settling else 0, exponent, is_reached=not (is_settling and period > 0))
 
 
+def known_regime(period: int, multiplier: complex, *, is_contact: bool) -> Verdict:
+    """Judge the record of a stable periodic motion that was solved for, which shows that motion alone."""
+    if not is_contact:
+        return Verdict(REGIME.index("no_contact"), period, repeats=True)
+    return Verdict(REGIME.index("periodic"), period, multiplier=_upper(multiplier), repeats=True)
+
+
+def _upper(multiplier: complex) -> complex:
+    """One of a conjugate pair: with the positive imaginary part."""
+    return complex(multiplier.real, abs(multiplier.imag))
+
+
 class _Search:
     """The search for a stable motion that a record agrees with or approaches."""
 
@@ -185,9 +198,10 @@ class _Search:
         draws_near = found.is_led_to or (last <= MOST_DISTANT and last <= first)
         if last > PERIOD_TOLERANCE and not draws_near:
             return None
-        upper = complex(found.multiplier.real, abs(found.multiplier.imag))
         is_reached = bool(max(first, last) <= PERIOD_TOLERANCE)
-        return Verdict(REGIME.index("periodic"), found.period, multiplier=upper, is_reached=is_reached)
+        return Verdict(
+            REGIME.index("periodic"), found.period, multiplier=_upper(found.multiplier), is_reached=is_reached
+        )
 
 
 def by_growth(

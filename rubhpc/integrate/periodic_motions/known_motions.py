@@ -115,6 +115,8 @@ class Place(NamedTuple):
         Revolutions.
     size : float
         Of the motion, as `PiecewiseMotion.size` has it.
+    multiplier : complex
+        The largest.
     approach : Approach
         Of cases that are as near to it as to no other, whole periods later.
     """
@@ -123,6 +125,7 @@ class Place(NamedTuple):
     state: State
     period: int
     size: float
+    multiplier: complex
     approach: Approach
 
     @property
@@ -158,7 +161,8 @@ class KnownMotions:
             matrix = monodromy(piecewise, (*turns[k:], *turns[:k])) if k else orbit.monodromy
             state = piecewise.march.state_of(motion, piecewise.contact_force(states, motion))
             approach = Approach.to(piecewise, matrix)
-            self._places.append(Place(motion, state, orbit.period, piecewise.size(motion), approach))
+            size, multiplier = piecewise.size(motion), complex(orbit.multipliers[0])
+            self._places.append(Place(motion, state, orbit.period, size, multiplier, approach))
             motion, states = turn.end, turn.states
         self._sections = np.array([place.motion for place in self._places])
         self._sizes = np.array([place.size for place in self._places])

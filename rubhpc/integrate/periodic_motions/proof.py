@@ -15,7 +15,6 @@ from rubhpc.integrate.measuring.orbit_measures import PERIOD_TOLERANCE
 from rubhpc.integrate.measuring.recorded_orbit import closest_return
 from rubhpc.integrate.measuring.regimes import MOST_DOUBLED, MOST_EVENTS, Solution
 from rubhpc.integrate.packing import output_degrees
-from rubhpc.integrate.periodic_motions.known_motions import nothing
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.periodic_motions.shooting import NotConverged, Orbit, shoot
 from rubhpc.integrate.transient import idle_of
@@ -52,16 +51,12 @@ class Solver:
         clearance: float,
         friction: float,
         final: State,
-        known: tuple[PiecewiseMotion, Orbit] | None = None,
         march: EventDrivenMarch | None = None,
     ) -> None:
-        """Take the end of a case in closed form, and the stable motion that it was begun on, if any.
-
-        A march of the case that is needed no more may be given, to be started again.
-        """
+        """Take the end of a case in closed form; a march of it that is needed no more is started again."""
         self._case = setup, clearance, friction, final
         self._piecewise: PiecewiseMotion | None = None
-        self._known, self._march = known, march
+        self._march = march
 
     @property
     def has_begun(self) -> bool:
@@ -70,8 +65,6 @@ class Solver:
 
     def __call__(self, period: int) -> Solution | None:
         """Return the motion that closes after this many revolutions, or fewer; None where none is found."""
-        if (held := self._held(period)) is not None:
-            return held
         try:
             if self._piecewise is None:
                 self._piecewise = PiecewiseMotion(*self._case, self._march)
@@ -117,20 +110,6 @@ class Solver:
                 march.start_again(state)
         except NoClosedForm:
             return
-
-    def _held(self, period: int) -> Solution | None:
-        """Return the motion that the case was begun on, if it has that period and still is there."""
-        if self._known is None or period % self._known[1].period:
-            return None
-        piecewise, orbit = self._known
-        end = piecewise.march.reduced(self._case[3])
-        begun = [orbit.motion, *(revolution.end for revolution in orbit.revolutions[:-1])]
-        away = [piecewise.size(end - motion) for motion in begun]
-        k = int(np.argmin(away))
-        if away[k] > nothing(piecewise.setup) * piecewise.size(begun[k]):
-            return None
-        section = np.roll(_section(piecewise, orbit), -k, axis=0)
-        return Solution(orbit.period, complex(orbit.multipliers[0]), section)
 
 
 def _solution(

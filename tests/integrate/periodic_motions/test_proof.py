@@ -1,12 +1,10 @@
 """The proof of a record that begins on a motion that was solved for, or looks like another one."""
 
-import numpy as np
 import pytest
 from overhung_pump import pump
 from trial_rig import trial_rig
 
 from rubhpc import periodic, simulate
-from rubhpc.integrate import case
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.periodic_motions import proof
 from rubhpc.integrate.setup import prepare
@@ -28,29 +26,6 @@ def test_motion_that_was_solved_for_is_not_solved_for_again(monkeypatch, revolut
     assert found.period == again.period == 2
     assert found.settled == 1
     assert found.largest_multiplier == pytest.approx(again.largest_multiplier, rel=1e-6)
-
-
-def test_motion_that_the_record_has_left_is_solved_for_anew(monkeypatch):
-    """The solver takes the motion it is given if the record ends on it, over its period or twice that."""
-    found = []
-
-    def note(march, setup, clearance, friction, final, begun_on):
-        found.append((begun_on, setup, clearance, friction, final))
-        return solver(march, setup, clearance, friction, final, begun_on)
-
-    solver = case.solver_of
-    monkeypatch.setattr(case, "solver_of", note)
-    simulate("mokhtar2017", transient="direct", revolutions=5, **TWICE)
-    (piecewise, orbit), setup, clearance, friction, final = found[0]
-    held = proof.Solver(setup, clearance, friction, final, (piecewise, orbit))
-    assert held(2).period == held(4).period == 2
-    assert not held.has_begun
-    solved = proof.Solver(setup, clearance, friction, final)(2)
-    assert held(2).section == pytest.approx(solved.section, rel=1e-6)
-    away = piecewise.march.state_of(1.001 * piecewise.march.reduced(final), np.zeros(1))
-    left = proof.Solver(setup, clearance, friction, away, (piecewise, orbit))
-    assert left(2).section == pytest.approx(solved.section, rel=1e-6)
-    assert left.has_begun
 
 
 @pytest.mark.parametrize("ratio", [0.948, 0.94798])
