@@ -14,7 +14,6 @@ from rubhpc.kernels.accumulators import DAMPING_LOSS, UNBALANCE_WORK, Accumulato
 from rubhpc.kernels.case_progress import NONE, Clock, Progress, shaft_turn
 from rubhpc.kernels.contact_modes import ModeTables, add_rows, dot, find_mode
 from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
-from rubhpc.kernels.transitions import Transitions, loss_gained
 
 Floats = NDArray[np.float64]
 
@@ -106,9 +105,7 @@ def leave_states(tables: ModeTables, mode: int, z: Floats, motion: Floats) -> No
 
 
 @jit_lean_sum
-def energies_gained(
-    tables: ModeTables, mode: int, begun: Floats, z: Floats, gained: Floats, transitions: Transitions
-) -> None:
+def energies_gained(tables: ModeTables, mode: int, begun: Floats, z: Floats, gained: Floats) -> None:
     """Fill `gained` (2,), J, with damping loss and unbalance work between coordinates (2, m) of a mode.
 
     The form of the loss is read once for both, and what is beside its diagonal, which is symmetric, once.
@@ -120,9 +117,6 @@ def energies_gained(
         gained[0], gained[1] = 0.0, 0.0
         return
     gained[1] = work_form(tables, mode, z_re, z_im) - work_form(tables, mode, y_re, y_im)
-    if transitions.mode.size > 0 and transitions.energy[mode] >= 0:
-        gained[0] = loss_gained(transitions, mode, m, begun, z)
-        return
     loss = 0.0
     for k in range(0, used, 4):  # four rows at a time: one would wait for its sum
         block = k - k % LANES  # where the block on the diagonal begins
@@ -178,9 +172,8 @@ def add_energies(
     z: Floats,
     recorder: Recorder,
     accumulator: Accumulator,
-    transitions: Transitions,
 ) -> None:
     """Add what damping took and the unbalance gave over a time (s) in a contact mode."""
-    energies_gained(tables, mode, begun, z, recorder.entry, transitions)
+    energies_gained(tables, mode, begun, z, recorder.entry)
     accumulator.energy[DAMPING_LOSS] += recorder.entry[0] + tables.steady_power[mode, 0] * time
     accumulator.energy[UNBALANCE_WORK] += recorder.entry[1] + tables.steady_power[mode, 1] * time

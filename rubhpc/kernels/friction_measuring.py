@@ -7,31 +7,36 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rubhpc.kernels._jit import jit_inline_sum, jit_part_sum
-from rubhpc.kernels.accumulators import DAMPING_LOSS, observe_force, observe_rub
+from rubhpc.kernels.accumulators import observe_force
 from rubhpc.kernels.case_progress import Clock, Progress  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE, ModeTables
 from rubhpc.kernels.event_search import move_ticks
 from rubhpc.kernels.force_average import AVERAGING_TIME
-from rubhpc.kernels.friction_coordinates import add_energies
+from rubhpc.kernels.friction_coordinates import used_width
 from rubhpc.kernels.friction_spans import (
     AFTER,
     BEFORE,
-    FRICTION,
     IMPULSE,
     MOST,
     copy_coordinates,
     forget_spans,
 )
-from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, FrictionBodies, state_of
-from rubhpc.kernels.friction_work import rub_through
+from rubhpc.kernels.friction_states import OPEN, FrictionBodies, state_of
 from rubhpc.kernels.peak_search import follow_force, recent_impulse
 from rubhpc.kernels.sampling import Recorder, read_samples, widen_extrema
+from rubhpc.kernels.span_energies import add_losses, add_rubs
 from rubhpc.kernels.span_forces import begin_force, pass_force
+from rubhpc.kernels.span_samples import read_noted
 from rubhpc.kernels.transitions import Transitions  # noqa: TC001 - part of a kernel's signature
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
+
+Floats = NDArray[np.float64]
 
 
 @jit_part_sum
@@ -54,15 +59,19 @@ def observe_spans(
         n_part += ((end - 1) >> level) - (begin >> level) + 1 if end > begin else 0
     spans.first[n_span] = n_part
     for first in range(n_span):
-        mode = spans.mode[first]
+        mode, n_alike = spans.mode[first], 0
         if mode < 0:
             continue
         for s in range(first, n_span):
             if spans.mode[s] == mode:
-                observe_span(
-                    tables, bodies, clock, s, first_sample, recorder, samples, accumulator, transitions
-                )
+                spans.alike[n_alike] = s
+                n_alike += 1
                 spans.mode[s] = -1 - mode
+        add_losses(tables, clock, mode, n_alike, recorder, accumulator, transitions)
+        observe_parts(
+            tables, bodies, clock, mode, n_alike, first_sample, recorder, samples, accumulator, transitions
+        )
+        add_rubs(tables, bodies, clock, mode, n_alike, spans, accumulator, transitions)
     if n_span > 0:
         last = spans.tick[n_span - 1, 1]
         progress.next_sample = max(first_sample, ((last - 1) >> level) + 1)
@@ -123,95 +132,95 @@ def watch_samples(clock: Clock, n_sample: int, recorder: Recorder, accumulator: 
 
 
 @jit_inline_sum
-def observe_span(
+def observe_parts(
     tables: ModeTables,
     bodies: FrictionBodies,
     clock: Clock,
-    s: int,
+    mode: int,
+    n_alike: int,
     first_sample: int,
     recorder: Recorder,
     samples: Samples,
     accumulator: Accumulator,
     transitions: Transitions,
 ) -> None:
-    """Measure span s, in one contact mode all along; `first_sample` is the first one of all spans.
+    """Read the samples of the spans `alike` in a contact mode, and the forces in the parts between them.
 
-    Of drive and friction together `add_energies` knows the work in closed form, and counts it with the
-    damping: what is added to them here is taken off there.
+    `first_sample` is the first one of all spans. Outputs that are tabulated by rows are read for several
+    samples at once, others one by one, or ahead while no pair is closed.
     """
-    spans, level = recorder.spans, clock.sample_level
-    mode, begin, end = spans.mode[s], spans.tick[s, 0], spans.tick[s, 1]
+    spans, level, is_tabulated = recorder.spans, clock.sample_level, False
+    if transitions.mode.size > 0:
+        is_tabulated = transitions.output[mode] >= 0
     states, n_row = tables.mask[mode], recorder.value.size // SAMPLES_AT_ONCE
-    time, interval = (end - begin) * clock.tick, clock.tick * (1 << level)
-    add_energies(tables, mode, time, spans.begun[s], spans.ended[s], recorder, accumulator, transitions)
-    here, spare, at_once = spans.path[0], spans.path[1], 1
-    copy_coordinates(spans.begun[s], here)
-    copy_coordinates(here, spare)
-    if states == 0:
+    used, interval, n_noted = used_width(tables, mode), clock.tick * (1 << level), 0
+    at_once = 1
+    if states == 0 and not is_tabulated:
         at_once = min(SAMPLES_AT_ONCE, max(1, (1 << (tables.power_re.shape[1] - 1)) >> level))
-    else:
+    for place in range(n_alike):
+        s = spans.alike[place]
+        begin, end = spans.tick[s, 0], spans.tick[s, 1]
+        time = (end - begin) * clock.tick
+        here, spare = spans.path[0], spans.path[1]
+        copy_coordinates(spans.begun[s], here)
+        if not is_tabulated:
+            copy_coordinates(here, spare)
         for i in range(bodies.rim_speed.size):
             if state_of(states, i) != OPEN:
-                begin_force(tables, bodies, mode, i, time, min(time, interval), here, spans.pair[i])
-    now, part = begin, spans.first[s]
-    while now < end:
-        following = (now >> level) + 1
-        if now == (now >> level) << level and now >> level >= first_sample:
-            sample = now >> level
-            count = min(at_once, ((end - 1) >> level) + 1 - sample)
-            read_samples(
-                tables.output,
-                mode,
-                here[0],
-                here[1],
-                sample,
-                count,
-                recorder.value,
-                samples.rotor,
-                samples.axial,
-                samples.lateral,
-                samples.probe,
-            )
-            place, following = (sample - first_sample) * n_row, sample + count
-            for k in range(count * n_row):
-                spans.value[place + k] = recorder.value[k]
-        stop = min(end, following << level)
-        there = spare
-        if stop == end:
-            there = spans.ended[s]
-        else:
-            move_ticks(tables, bodies, mode, stop - now, clock.tick, here, spare)
-        if states != 0:
-            since, until = (now - begin) * clock.tick, (stop - begin) * clock.tick
-            for i in range(bodies.rim_speed.size):
-                state = state_of(states, i)
-                if state == OPEN:
-                    continue
-                pair, force, is_last = spans.pair[i], spans.force[part, i], stop == end
-                pass_force(tables, bodies, mode, i, since, until, is_last, there, pair, force)
-                samples.force[i, now >> level] += force[IMPULSE] / interval
-                accumulator.impulse[i] += force[IMPULSE]
-        here, spare, now, part = there, here, stop, part + 1
-    if states == 0 or time == 0.0:
-        return
-    for i in range(bodies.rim_speed.size):
-        state = state_of(states, i)
-        if state == OPEN:
-            continue
-        accumulator.contact_time[i] += time
-        if state == STUCK:
-            accumulator.stick_time[i] += time
-            accumulator.least_slip[i] = min(accumulator.least_slip[i], 0.0)
-            drive, friction_work = bodies.rim_speed[i] * spans.pair[i, FRICTION], 0.0
-        else:
-            sense = -1.0 if state == BACKWARD else 1.0
-            impulse, work, least, most = rub_through(
-                tables, bodies, clock, mode, i, end - begin, spans.begun[s], spans.ended[s], spans.path
-            )
-            friction_work = bodies.sliding[i] * work
-            drive = sense * bodies.sliding[i] * bodies.rim_speed[i] * impulse
-            slip = max(least, 0.0) if state == FORWARD else -most
-            accumulator.least_slip[i] = min(accumulator.least_slip[i], slip)
-            accumulator.friction_work[i] += friction_work
-        observe_rub(drive, friction_work, accumulator)
-        accumulator.energy[DAMPING_LOSS] += drive - friction_work
+                begin_force(tables, bodies, mode, i, time, min(time, interval), here, spans.pair[s, i])
+        now, part = begin, spans.first[s]
+        while now < end:
+            following = (now >> level) + 1
+            if now == (now >> level) << level and now >> level >= first_sample:
+                sample = now >> level
+                if is_tabulated:
+                    if n_noted == SAMPLES_AT_ONCE:
+                        read_noted(transitions, mode, n_noted, used, n_row, first_sample, spans, samples)
+                        n_noted = 0
+                    spans.sample[n_noted] = sample
+                    copy_used(used, here, spans.point[n_noted])
+                    n_noted += 1
+                else:
+                    count = min(at_once, ((end - 1) >> level) + 1 - sample)
+                    read_samples(
+                        tables.output,
+                        mode,
+                        here[0],
+                        here[1],
+                        sample,
+                        count,
+                        recorder.value,
+                        samples.rotor,
+                        samples.axial,
+                        samples.lateral,
+                        samples.probe,
+                    )
+                    at, following = (sample - first_sample) * n_row, sample + count
+                    for k in range(count * n_row):
+                        spans.value[at + k] = recorder.value[k]
+            stop = min(end, following << level)
+            there = spare
+            if stop == end:
+                there = spans.ended[s]
+            else:
+                move_ticks(tables, bodies, mode, stop - now, clock.tick, here, spare)
+            if states != 0:
+                since, until = (now - begin) * clock.tick, (stop - begin) * clock.tick
+                for i in range(bodies.rim_speed.size):
+                    if state_of(states, i) == OPEN:
+                        continue
+                    pair, force, is_last = spans.pair[s, i], spans.force[part, i], stop == end
+                    pass_force(tables, bodies, mode, i, since, until, is_last, there, pair, force)
+                    samples.force[i, now >> level] += force[IMPULSE] / interval
+                    accumulator.impulse[i] += force[IMPULSE]
+            here, spare, now, part = there, here, stop, part + 1
+    if n_noted > 0:
+        read_noted(transitions, mode, n_noted, used, n_row, first_sample, spans, samples)
+
+
+@jit_inline_sum
+def copy_used(used: int, z: Floats, target: Floats) -> None:
+    """Copy the coordinates (2, m) that are used."""
+    for part in range(2):
+        for k in range(used):
+            target[part, k] = z[part, k]

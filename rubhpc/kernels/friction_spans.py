@@ -17,13 +17,16 @@ from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-MOST_SPANS = 64
-MOST_PARTS = 512  # of the spans, which samples part
+MOST_SPANS = 128
+MOST_PARTS = 1024  # of the spans, which samples part
 LONGEST = 128  # samples after which a span is ended without an event
+ROWS_AT_ONCE = 4  # of outputs
+AT_ONCE = 12  # spans for which a form is read once, a multiple of four
 BEFORE, AFTER, IMPULSE, MOST = range(4)  # columns of `Spans.force`
 # Columns of `Spans.pair`. Of the force where a part begins: value, N, primitive, N s, steady part, N, growth,
-# N/s, and by how much its means may exceed a parabola, N. Then the integral of the friction, N s.
-VALUE, PRIMITIVE, STEADY, RAMP, EXCESS, FRICTION = range(6)
+# N/s, and by how much its means may exceed a parabola, N. Then the integral of the friction of a pair that
+# sticks, and of the force of one that slides, N s.
+VALUE, PRIMITIVE, STEADY, RAMP, EXCESS, RUBBED = range(6)
 
 
 class Spans(NamedTuple):
@@ -38,8 +41,13 @@ class Spans(NamedTuple):
     given: Floats  # (n_span, q), normal impulses of the events that end them, N s
     force: Floats  # (n_part, q, 4), of the parts: force at both ends, N, impulse, N s, bound on the force, N
     value: Floats  # ((n_part + SAMPLES_AT_ONCE) o,), outputs sample by sample
-    pair: Floats  # (q, 6), of pairs where a span is measured
+    pair: Floats  # (n_span, q, 6), of pairs
     path: Floats  # (4, 2, m), coordinates within a span
+    alike: Ints  # (n_span,), spans in one contact mode
+    sample: Ints  # (SAMPLES_AT_ONCE,), samples that are not read yet
+    point: Floats  # (SAMPLES_AT_ONCE, 2, m), coordinates there
+    read: Floats  # (SAMPLES_AT_ONCE whole_rows(o),), their outputs
+    gained: Floats  # (product_forms.AT_ONCE,), by forms in some spans
 
 
 def no_spans() -> Spans:
@@ -63,9 +71,19 @@ def _with_room(n_span: int, n_part: int, m: int, q: int, n_row: int) -> Spans:
         given=np.zeros((n_span, q)),
         force=np.zeros((n_part, q, 4)),
         value=np.zeros((n_part + SAMPLES_AT_ONCE) * n_row),
-        pair=np.zeros((q, 6)),
+        pair=np.zeros((n_span, q, 6)),
         path=np.zeros((4, 2, m)),
+        alike=np.zeros(n_span, dtype=np.int64),
+        sample=np.zeros(SAMPLES_AT_ONCE, dtype=np.int64),
+        point=np.zeros((SAMPLES_AT_ONCE, 2, m)),
+        read=np.zeros(SAMPLES_AT_ONCE * whole_rows(n_row)),
+        gained=np.zeros(AT_ONCE),
     )
+
+
+def whole_rows(n_row: int) -> int:
+    """How many output rows are read: a multiple of four."""
+    return -(-n_row // ROWS_AT_ONCE) * ROWS_AT_ONCE
 
 
 @jit_inline

@@ -1,4 +1,4 @@
-"""Work of friction over a span between two events, by a quadrature of force and slip."""
+"""Work of friction over a span between two events."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ def rub_through(
     begun: Floats,
     z: Floats,
     path: Floats,
-) -> tuple[float, float, float, float]:
-    """Impulse (N s) of sliding pair i over a span, integral (N m) of force times slip, least and most slip.
+) -> tuple[float, float, float]:
+    """Integral (N m) of force times slip of sliding pair i over a span, by a quadrature, least and most slip.
 
     The slip (m/s) is that in its sense. The span has `n_tick` ticks, begins with `begun` and ends with `z`
     (2, m); `path` (4, 2, m) is work space.
@@ -62,7 +62,7 @@ def rub_through(
     copy_coordinates(begun, at)
     stride_re, stride_im = stride[0, :used], stride[1, :used]
     before = dot(slip_re, slip_im, start[0], start[1])
-    impulse, total, least, most, left, known = 0.0, 0.0, before, before, n_tick, -1
+    total, least, most, left, known = 0.0, before, before, n_tick, -1
     reach = min(n_tick, longest_move(tables))
     longest = max(1, int(min(resolved_panel(tables, mode, i, start) / clock.tick, 1.0 * reach)))
     panel = even_panel(left, longest)
@@ -109,13 +109,34 @@ def rub_through(
         time *= N_PANEL
         gained, way = gains(tables, mode, i, time, start, at)
         total += (fine - first_force * first_slip) * time + gained * first_slip + way * first_force
-        impulse += gained
         least, most = min(least, low), max(most, high)
         left -= N_PANEL * panel
         panel = min(panel * SHORTER, even_panel(left, longest))
         start, at = at, start
     gained, _ = gains(tables, mode, i, left * clock.tick, start, z)
-    return impulse + gained, total + gained * before, least, most
+    return total + gained * before, least, most
+
+
+@jit_inline_sum
+def still_rub(tables: ModeTables, mode: int, i: int, time: float, begun: Floats, z: Floats) -> float:
+    """What the form of sliding pair i (`Transitions.rub`) lacks of the integral of force times slip, N m.
+
+    That is the mean of the unbalance response, and all of the coordinates (2, m) that do not move or grow
+    linearly over the `time` (s) of a span.
+    """
+    first, n_still = tables.n_eigenmode[mode], tables.switch_re.shape[1] + 1
+    force_re, force_im = tables.switch_re[mode, 2 * i], tables.switch_im[mode, 2 * i]
+    slip_re, slip_im = tables.switch_re[mode, 2 * i + 1], tables.switch_im[mode, 2 * i + 1]
+    square = begun[0, first] * begun[0, first] + begun[1, first] * begun[1, first]
+    mean = 0.5 * square * (force_re[first] * slip_re[first] + force_im[first] * slip_im[first])
+    force, slip, next_force, next_slip = 0.0, 0.0, 0.0, 0.0
+    for k in range(first + 1, first + 1 + n_still):
+        force += force_re[k] * begun[0, k]
+        slip += slip_re[k] * begun[0, k]
+        next_force += force_re[k] * z[0, k]
+        next_slip += slip_re[k] * z[0, k]
+    mean += (force * slip + next_force * next_slip) / 3.0 + (force * next_slip + next_force * slip) / 6.0
+    return float(mean * time)
 
 
 @jit_inline_sum

@@ -135,11 +135,26 @@ def read_samples(
     probe: Floats,
 ) -> None:
     """Fill `value` with the outputs of `count` samples, and the record with those that belong to it."""
-    q = axial.shape[0]
-    n_row, n_sample = value.size // SAMPLES_AT_ONCE, rotor.shape[1]
-    first_probe = N_ROTOR_ROW + 3 * q
+    n_row = value.size // SAMPLES_AT_ONCE
     read_outputs(output, mode, z_re, z_im, -(-count * n_row // LANES) * LANES, value)
-    for j in range(min(count, n_sample - first)):
+    store_samples(value, n_row, first, count, rotor, axial, lateral, probe)
+
+
+@jit_inline_sum
+def store_samples(
+    value: Floats,
+    n_row: int,
+    first: int,
+    count: int,
+    rotor: Floats,
+    axial: Floats,
+    lateral: Floats,
+    probe: Floats,
+) -> None:
+    """Store in the record those of `count` samples, with `n_row` outputs each, that belong to it."""
+    q = axial.shape[0]
+    first_probe = N_ROTOR_ROW + 3 * q
+    for j in range(min(count, rotor.shape[1] - first)):
         start = j * n_row
         rotor[VERTICAL, first + j] = value[start + VERTICAL]
         rotor[HORIZONTAL, first + j] = value[start + HORIZONTAL]

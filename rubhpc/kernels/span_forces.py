@@ -17,11 +17,11 @@ from rubhpc.kernels.friction_spans import (
     AFTER,
     BEFORE,
     EXCESS,
-    FRICTION,
     IMPULSE,
     MOST,
     PRIMITIVE,
     RAMP,
+    RUBBED,
     STEADY,
     VALUE,
 )
@@ -101,7 +101,7 @@ def begin_force(
         share * ramp + other_share * other_ramp,
     )
     gained = time * (other_steady - steady + 0.5 * time * (other_ramp - ramp))
-    pair[FRICTION] = along * (gained - (other_primitive - primitive))
+    pair[RUBBED] = along * (gained - (other_primitive - primitive))
 
 
 @jit_inline_sum
@@ -124,7 +124,7 @@ def pass_force(
     if is_stuck:
         other_value, other_primitive = read_force(tables, mode, 2 * i + 1, z)
         if is_last:
-            pair[FRICTION] += 0.5 * (other_primitive - primitive)
+            pair[RUBBED] += 0.5 * (other_primitive - primitive)
         value, primitive = share * (value + other_value), share * (primitive + other_primitive)
     time = until - since
     steady = pair[STEADY] + 0.5 * pair[RAMP] * (since + until)
@@ -132,6 +132,7 @@ def pass_force(
     most = highest(impulse / time, pair[VALUE], value) + pair[EXCESS]
     part[BEFORE], part[AFTER], part[IMPULSE], part[MOST] = pair[VALUE], value, impulse, most
     pair[VALUE], pair[PRIMITIVE] = value, primitive
+    pair[RUBBED] += 0.0 if is_stuck else impulse
 
 
 @jit_inline_sum

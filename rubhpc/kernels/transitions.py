@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_apart_sum, jit_inline_sum, jit_lean, jit_lean_sum, short_loops
+from rubhpc.kernels._jit import jit_apart_sum, jit_inline_sum, jit_lean, short_loops
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -31,21 +31,23 @@ class Transitions(NamedTuple):
 
     Coordinates count from 0 to 2 m, real parts first. A transition is in `number`: how many coordinates stay
     what they are, how many blocks there are, where those coordinates are, and were; then for each block the
-    number of its sources, that of its targets, its place in `value`, its sources and its targets. The loss
-    in a mode is the number of its blocks, then for each its size, its place in `value` and its coordinates.
+    number of its sources, that of its targets, its place in `value`, its sources and its targets. A form of
+    a mode is the number of its blocks, then for each its size, its place in `value` and its coordinates.
     """
 
     entry: Ints  # (p, p), place in `number` of that from one mode to another; else UNKNOWN less passages
     mode: Ints  # (p,), place in `value` of what is seen and given in a mode, and its reach; or UNKNOWN
-    energy: Ints  # (p,), place in `number` of the energies of a mode
+    output: Ints  # (p,), place in `value` of the output rows (o, 2, m) of a mode (`span_samples`)
+    energy: Ints  # (p,), place in `number` of the form of the loss in a mode
+    rub: Ints  # (p, q), likewise of the normal force times the slip of a pair that slides
     number: Ints  # as above
     value: Floats
-    source: Floats  # (4 m,), work space
-    target: Floats  # (4 m,), likewise
+    source: Floats  # (2 AT_ONCE m,), work space (`product_forms`)
+    target: Floats  # (2 AT_ONCE m,), likewise
 
 
-_EMPTY, _ROOM = np.zeros(0, dtype=np.int64), np.zeros(0)
-NO_TRANSITIONS = Transitions(np.zeros((0, 0), dtype=np.int64), _EMPTY, _EMPTY, _EMPTY, _ROOM, _ROOM, _ROOM)
+_NONE, _EMPTY, _ROOM = np.zeros((0, 0), dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0)
+NO_TRANSITIONS = Transitions(_NONE, _EMPTY, _EMPTY, _EMPTY, _NONE, _EMPTY, _ROOM, _ROOM, _ROOM)
 
 
 @jit_inline_sum
@@ -157,50 +159,3 @@ def pass_block(
             last[k] += first[k] * a
     for k in range(places.size - n_row):
         after[places[n_row + k]] = last[k]
-
-
-@jit_lean_sum
-@short_loops
-def loss_gained(transitions: Transitions, mode: int, m: int, begun: Floats, z: Floats) -> float:
-    """Loss of damping, J, between coordinates (2, m) of a mode, by the blocks of its form.
-
-    With the difference d and the sum s of both it is `d' P s`.
-    """
-    number, change, total = transitions.number, transitions.source, transitions.target
-    place = transitions.energy[mode]
-    n_block, loss = number[place], 0.0
-    place += 1
-    for _ in range(n_block):
-        size, at = number[place], number[place + 1]
-        place += 2
-        rows = transitions.value[at : at + size * size]
-        for k in range(size):
-            here = number[place + k]
-            part = 1 if here >= m else 0
-            new, old = z[part, here - part * m], begun[part, here - part * m]
-            change[k], total[k] = new - old, new + old
-        place += size
-        for block in range(0, size, LANES):  # eight rows at a time: one would wait for its sum
-            first, second = rows[block * size :], rows[(block + 1) * size :]
-            third, fourth = rows[(block + 2) * size :], rows[(block + 3) * size :]
-            fifth, sixth = rows[(block + 4) * size :], rows[(block + 5) * size :]
-            seventh, eighth = rows[(block + 6) * size :], rows[(block + 7) * size :]
-            a, b, c, d = change[block], change[block + 1], change[block + 2], change[block + 3]
-            e, f, g, h = change[block + 4], change[block + 5], change[block + 6], change[block + 7]
-            p, q, r, s = total[block], total[block + 1], total[block + 2], total[block + 3]
-            t, u, v, w = total[block + 4], total[block + 5], total[block + 6], total[block + 7]
-            for j in range(block):  # symmetric: what is not on the diagonal is read once
-                loss += (
-                    (a * first[j] + b * second[j] + c * third[j] + d * fourth[j])
-                    + (e * fifth[j] + f * sixth[j] + g * seventh[j] + h * eighth[j])
-                ) * total[j]
-                loss += (
-                    (p * first[j] + q * second[j] + r * third[j] + s * fourth[j])
-                    + (t * fifth[j] + u * sixth[j] + v * seventh[j] + w * eighth[j])
-                ) * change[j]
-            for j in range(block, block + LANES):
-                loss += (
-                    (a * first[j] + b * second[j] + c * third[j] + d * fourth[j])
-                    + (e * fifth[j] + f * sixth[j] + g * seventh[j] + h * eighth[j])
-                ) * total[j]
-    return loss

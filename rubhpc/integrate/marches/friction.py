@@ -157,9 +157,10 @@ class FrictionMarch(EventDrivenMarch):
         if self._met is None or not self._met.is_due(before, wanted, is_counted=is_known):
             super().find_wanted()
             return
-        left = self._tables_of(before, is_copied=not is_known)  # the other may take its place
-        super().find_wanted()
-        self._met.tabulate(left, self._tables_of(wanted), self.bodies, self._friction)
+        left, growing = self._tables_of(before, is_copied=not is_known), self.exponents(before)
+        super().find_wanted()  # the mode wanted may take the other's place
+        both = growing, self.exponents(wanted)
+        self._met.tabulate(left, self._tables_of(wanted), both, self.bodies, self._friction)
 
     def _tables_of(self, mask: int, *, is_copied: bool = False) -> ModeTables:
         """The tables (1, ...) of a set of states that they hold."""

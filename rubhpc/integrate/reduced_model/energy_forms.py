@@ -105,20 +105,8 @@ def energy_forms(
     resisting = reduced.damping @ rate + skew @ shape - friction
     phasor = reduced.force[0] - 1j * reduced.force[1]
     turning = np.full(exponent.shape, 1j * reduced.spin)
-    forms = []
-    for partner, other in ((resisting, exponent), (resisting.conj(), exponent.conj())):
-        power = rate.T @ partner
-        form = _primitive(power, exponent[:, None] + other)
-        if growing.which.size:
-            _follow_growth(form, power, exponent, n_eigenmode, growing)
-        forms.append(form)
-    with_itself, with_conjugate = forms
-    loss = 0.5 * np.block(
-        [
-            [(with_itself + with_conjugate).real, (with_conjugate - with_itself).imag],
-            [-(with_itself + with_conjugate).imag, (with_conjugate - with_itself).real],
-        ]
-    )
+    powers = rate.T @ resisting, rate.T @ resisting.conj()
+    loss = product_form(*powers, exponent, n_eigenmode, growing)
     work = 0.5 * np.stack(
         [
             _primitive(phasor @ rate, exponent + turning),
@@ -131,7 +119,31 @@ def energy_forms(
         steady[:] = response @ resisting[:, n_eigenmode].conj(), response @ phasor.conj()
     if growing.which.size:
         steady[0] += 2.0 * rate[:, growing.steady] @ resisting[:, growing.steady]
-    return Energies(0.5 * (loss + loss.T), work, 0.5 * steady.real)
+    return Energies(loss, work, 0.5 * steady.real)
+
+
+def product_form(
+    power: Complexes, with_conjugate: Complexes, exponent: Complexes, n_eigenmode: int, growing: Growth
+) -> Floats:
+    """Symmetric form (2 m, 2 m) of real and imaginary parts whose growth is the integral of a product.
+
+    With rows a and b (r, m) it is the product of `Re(a z)` and `Re(b z)`, summed over r. `power` is `a' b`,
+    `with_conjugate` is `a' conj(b)`; coordinates that grow linearly are among those of b alone.
+    """
+    forms = []
+    for product, other in ((power, exponent), (with_conjugate, exponent.conj())):
+        form = _primitive(product, exponent[:, None] + other)
+        if growing.which.size:
+            _follow_growth(form, product, exponent, n_eigenmode, growing)
+        forms.append(form)
+    itself, conjugate = forms
+    whole = 0.5 * np.block(
+        [
+            [(itself + conjugate).real, (conjugate - itself).imag],
+            [-(itself + conjugate).imag, (conjugate - itself).real],
+        ]
+    )
+    return 0.5 * (whole + whole.T)
 
 
 def _follow_growth(

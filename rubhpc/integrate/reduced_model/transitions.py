@@ -9,6 +9,11 @@ import numpy as np
 
 from rubhpc.integrate.reduced_model.array_room import aligned, room_for
 from rubhpc.integrate.reduced_model.coupling import coupled_rows
+from rubhpc.integrate.reduced_model.rub_forms import rub_form
+from rubhpc.kernels._jit import plain
+from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
+from rubhpc.kernels.friction_spans import AT_ONCE, whole_rows
+from rubhpc.kernels.friction_states import BACKWARD, FORWARD, state_of
 from rubhpc.kernels.transitions import LANES, UNKNOWN, WORTH_A_TABLE, Transitions
 
 if TYPE_CHECKING:
@@ -21,6 +26,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]
+    Exponents = tuple[Floats, Floats]
 
 MOST_BYTES = 2**26  # of the transitions of a case
 MOST_SHARED = 2**27  # of a room of transitions, above which cases begin another one
@@ -81,9 +87,12 @@ class MetTransitions:
         self._room = room
         self._entry: dict[tuple[int, int], int] = {}  # by sets of states
         self._modes: dict[int, int] = {}
+        self._outputs: dict[int, int] = {}
         self._energies: dict[int, int] = {}
+        self._rubs: dict[tuple[int, int], int] = {}  # by set of states and pair
         self._n_byte = 0
         self._masks: list[int] = []
+        self._spare: tuple[Floats, Floats] | None = None  # work space of kernels
         self._placed: Transitions | None = None
 
     def among(self, tables: ModeTables) -> Transitions:
@@ -92,16 +101,22 @@ class MetTransitions:
         self._masks = tables.mask.tolist()
         place = {mask: k for k, mask in enumerate(self._masks) if mask >= 0}
         p, m = len(self._masks), tables.pace.shape[1]
-        entry, mode, energy = np.full((p, p), UNKNOWN), np.full(p, UNKNOWN), np.full(p, UNKNOWN)
+        places = np.full((p, p + 3 + tables.switch_re.shape[1] // 2), UNKNOWN)
+        entry, rub = places[:, :p].copy(), places[:, p + 3 :].copy()
+        mode, output, energy = places[:, p : p + 3].T.copy()
         for (before, after), passed in self._entry.items():
             if before in place and after in place:
                 entry[place[before], place[after]] = passed
-        for known, at in ((self._modes, mode), (self._energies, energy)):
+        for known, at in ((self._modes, mode), (self._outputs, output), (self._energies, energy)):
             for mask in known.keys() & place.keys():
                 at[place[mask]] = known[mask]
-        self._placed = Transitions(
-            entry, mode, energy, self._room.number, self._room.value, aligned((4 * m,)), aligned((4 * m,))
-        )
+        for (mask, i), at_number in self._rubs.items():
+            if mask in place:
+                rub[place[mask], i] = at_number
+        number, value = self._room.number, self._room.value
+        if self._spare is None or self._spare[0].size != 2 * AT_ONCE * m:
+            self._spare = aligned((2 * AT_ONCE * m,)), aligned((2 * AT_ONCE * m,))
+        self._placed = Transitions(entry, mode, output, energy, rub, number, value, *self._spare)
         return self._placed
 
     def is_due(self, before: int, after: int, *, is_counted: bool) -> bool:
@@ -116,26 +131,44 @@ class MetTransitions:
         return passed == UNKNOWN - WORTH_A_TABLE and self._n_byte <= MOST_BYTES
 
     def tabulate(
-        self, before: ModeTables, after: ModeTables, reduced: Reduced, bodies: FrictionBodies
+        self,
+        before: ModeTables,
+        after: ModeTables,
+        exponents: tuple[Exponents, Exponents],
+        reduced: Reduced,
+        bodies: FrictionBodies,
     ) -> None:
-        """Tabulate the transition between two contact modes, by the tables (1, ...) of each."""
+        """Tabulate the transition between two contact modes, by the tables (1, ...) and exponents of each."""
         masks = int(before.mask[0]), int(after.mask[0])
-        for mask, tables in zip(masks, (before, after), strict=True):
+        for mask, tables, growing in zip(masks, (before, after), exponents, strict=True):
             if mask not in self._modes:
                 _, self._modes[mask] = self._take(
                     (mask, mask, "mode"), partial(seen_in, tables, reduced, bodies)
                 )
             if mask not in self._energies and tables.loss.shape[1]:
-                key = mask, mask, "energies"
-                self._energies[mask], _ = self._take(key, partial(loss_blocks, tables.loss[0]))
+                self._tabulate_measures(tables, growing)
         self._entry[masks], _ = self._take((*masks, "transition"), partial(transition, before, after))
+
+    def _tabulate_measures(self, tables: ModeTables, exponents: Exponents) -> None:
+        """Tabulate what spans in a contact mode are measured by."""
+        mask, q = int(tables.mask[0]), tables.switch_re.shape[1] // 2
+        _, self._outputs[mask] = self._take((mask, mask, "outputs"), partial(output_rows, tables))
+        key = mask, mask, "energies"
+        self._energies[mask], _ = self._take(key, partial(form_blocks, tables.loss[0]))
+        for i in range(q):
+            if plain(state_of)(mask, i) not in (FORWARD, BACKWARD):
+                continue
+            place, _ = self._take((mask, i, "rub"), partial(rub_blocks, tables, i, exponents))
+            if self._room.number[place] != UNKNOWN:
+                self._rubs[mask, i] = place
 
     def _note_passages(self) -> None:
         """Take over the kernel's counts of passages; they must be passed to it again afterwards."""
         if self._placed is not None:
             entry, self._placed = self._placed.entry, None
-            for before, after in np.argwhere(entry != UNKNOWN).tolist():
-                self._entry[self._masks[before], self._masks[after]] = int(entry[before, after])
+            met = np.nonzero(entry != UNKNOWN)
+            for before, after, passed in zip(*(part.tolist() for part in (*met, entry[met])), strict=True):
+                self._entry[self._masks[before], self._masks[after]] = passed
 
     def _take(self, key: tuple[int, int, str], make: Callable[[], Part]) -> tuple[int, int]:
         """Places in `number` and `value` of the part of a key."""
@@ -224,8 +257,16 @@ def _blocks(matrix: Floats) -> list[tuple[Ints, Ints]]:
     return [(rows, columns) for rows, columns in parts if rows.size and columns.size]
 
 
-def loss_blocks(form: Floats) -> Part:
-    """The form (2 m, 2 m) of the coordinates whose growth is the loss of damping, by its blocks."""
+def output_rows(tables: ModeTables) -> Part:
+    """The output rows at a time, (o, 2, m), with rows of zeros up to a multiple of four."""
+    n_row = tables.output.shape[2] // SAMPLES_AT_ONCE
+    rows = np.zeros((whole_rows(n_row), tables.output.shape[1]))
+    rows[:n_row] = tables.output[0, :, :n_row].T
+    return Part(np.zeros(0, dtype=np.int64), rows.ravel(), np.zeros(0, dtype=np.int64))
+
+
+def form_blocks(form: Floats) -> Part:
+    """A symmetric form (2 m, 2 m) of coordinates by its blocks."""
     live = np.flatnonzero(form.any(axis=1))
     blocks = [live[rows] for rows in coupled_rows(form[live[:, None], live] != 0.0)]
     index, shifted, n_value = [len(blocks)], list[int](), 0
@@ -239,6 +280,14 @@ def loss_blocks(form: Floats) -> Part:
         value.append(block.ravel())
         n_value += block.size
     return Part(np.array(index), np.concatenate([*value, np.zeros(0)]), np.array(shifted, dtype=np.int64))
+
+
+def rub_blocks(tables: ModeTables, i: int, exponents: Exponents) -> Part:
+    """The form of force times slip of sliding pair i by its blocks; UNKNOWN where there is none."""
+    form = rub_form(tables, i, exponents)
+    if form is None:
+        return Part(np.array([UNKNOWN]), np.zeros(0), np.zeros(0, dtype=np.int64))
+    return form_blocks(form)
 
 
 def _whole(count: int) -> int:

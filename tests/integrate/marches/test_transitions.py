@@ -13,8 +13,13 @@ from rubhpc.integrate.reduced_model import transitions
 from rubhpc.integrate.reduced_model.transitions import MetTransitions, TransitionRoom
 from rubhpc.integrate.setup import prepare
 from rubhpc.integrate.tangent_motion import TangentMotion
+from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
 from rubhpc.kernels.friction_coordinates import energies_gained, used_width
-from rubhpc.kernels.transitions import NO_TRANSITIONS, UNKNOWN, WORTH_A_TABLE, add_impulses, pass_over, see
+from rubhpc.kernels.friction_spans import AT_ONCE, new_spans, whole_rows
+from rubhpc.kernels.friction_work import still_rub
+from rubhpc.kernels.product_forms import forms_gained
+from rubhpc.kernels.span_samples import read_rows
+from rubhpc.kernels.transitions import UNKNOWN, WORTH_A_TABLE, add_impulses, pass_over, see
 from rubhpc.study.study import Contact, Integrator, Recording
 
 PER_REVOLUTION = 64
@@ -49,8 +54,18 @@ def tables_of(march, before, after):
     met = MetTransitions(TransitionRoom())
     met._entry[before, after] = UNKNOWN - WORTH_A_TABLE
     assert met.is_due(before, after, is_counted=True)
-    met.tabulate(march._tables_of(before), march._tables_of(after), march.bodies, march._friction)
+    modes = [march._tables_of(mask) for mask in (before, after)]
+    growing = march.exponents(before), march.exponents(after)
+    met.tabulate(*modes, growing, march.bodies, march._friction)
     return met.among(march.tables)
+
+
+def nodes_of(length):
+    """Nodes and weights on a span (s): Gauss's on parts that grow from a nanosecond."""
+    x, w = np.polynomial.legendre.leggauss(20)
+    ends = np.concatenate([[0.0], np.geomspace(1e-9, length, 40)])
+    half = 0.5 * np.diff(ends)[:, None]
+    return ((ends[:-1, None] + half) + half * x).ravel(), (half * w).ravel()
 
 
 def pairs_of_modes(march):
@@ -119,22 +134,93 @@ def test_what_an_event_sees_and_gives(settled):
     np.testing.assert_allclose(change, wanted, rtol=0.0, atol=1e-9 * np.abs(wanted).max())
 
 
-def test_losses_by_blocks_are_those_of_the_whole_form(settled):
+def growths(transitions, place, begun, ended):
+    """Growth of a form in spans between coordinates (n, 2, m), read together."""
+    count, m = len(begun), begun.shape[2]
+    spans = new_spans(m, 3, 0)
+    spans.begun[:count], spans.ended[:count] = begun, ended
+    spans.alike[:count] = np.arange(count)
+    forms_gained(transitions, place, spans, spans.alike, count, m, spans.gained)
+    return spans.gained[:count]
+
+
+@pytest.mark.parametrize("count", [1, 3, AT_ONCE])
+def test_losses_by_blocks_are_those_of_the_whole_form(settled, count):
     rng, march = np.random.default_rng(3), settled
     for before, after in pairs_of_modes(march)[:6]:
         transitions = tables_of(march, before, after)
         for mask in (before, after):
             mode = march.tables.mask.tolist().index(mask)
             used = used_width.py_func(march.tables, mode)
-            first, second = np.zeros((2, 2, march._z.shape[1]))
-            first[:, :used], second[:, :used] = rng.standard_normal((2, 2, used))
-            gained = np.zeros((2, 2))
-            for given, found in zip((NO_TRANSITIONS, transitions), gained, strict=True):
-                energies_gained(march.tables, mode, first, second, found, given)
-            form = march.tables.loss[mode]
-            size = np.abs(second.ravel()) @ np.abs(form) @ np.abs(second.ravel())
-            assert abs(gained[0, 0] - gained[1, 0]) < 1e-12 * size
-            assert gained[0, 1] == gained[1, 1]
+            first, second = np.zeros((2, count, 2, march._z.shape[1]))
+            first[..., :used], second[..., :used] = rng.standard_normal((2, count, 2, used))
+            found = growths(transitions, transitions.energy[mode], first, second)
+            for begun, ended, gained in zip(first, second, found, strict=True):
+                known, form = np.zeros(2), march.tables.loss[mode]
+                energies_gained(march.tables, mode, begun, ended, known)
+                size = np.abs(ended.ravel()) @ np.abs(form) @ np.abs(ended.ravel())
+                assert abs(known[0] - gained) < 1e-12 * size
+
+
+def test_a_form_gives_force_times_slip(settled):
+    """Against Gauss's quadrature on parts that grow from a nanosecond."""
+    rng, march = np.random.default_rng(5), settled
+    masks, n_form = march.tables.mask.tolist(), 0
+    for before, after in pairs_of_modes(march):
+        transitions = tables_of(march, before, after)
+        mode = masks.index(after)
+        for i in np.flatnonzero(transitions.rub[mode] >= 0).tolist():
+            begun = entered(march, mode, march._motion * rng.uniform(0.5, 1.5, march._motion.size), 0.7)
+            (real, imaginary), drift = march.exponents(after)
+            length = 10.0 ** rng.uniform(-5.0, -3.0)
+            time, weight = nodes_of(length)
+            times = np.append(time, length)
+            z = (begun[0] + 1j * begun[1])[:, None] * np.exp((real + 1j * imaginary)[:, None] * times)
+            z += drift[:, None] * times
+            rows = march.tables.switch_re[mode] + 1j * march.tables.switch_im[mode]
+            force, slip = ((rows[k] @ z).real[:-1] for k in (2 * i, 2 * i + 1))
+            ended = np.stack([z[:, -1].real, z[:, -1].imag])
+            found = growths(transitions, transitions.rub[mode, i], begun[None], ended[None])[0]
+            found += still_rub(march.tables, mode, i, length, begun, ended)
+            assert abs(found - weight @ (force * slip)) < 1e-9 * (weight @ np.abs(force * slip))
+            n_form += 1
+    assert n_form > 5
+
+
+def test_rows_give_the_outputs(settled):
+    rng, march = np.random.default_rng(6), settled
+    before, after = pairs_of_modes(march)[0]
+    transitions, mode = tables_of(march, before, after), march.tables.mask.tolist().index(after)
+    used, m = used_width.py_func(march.tables, mode), march._z.shape[1]
+    n_row = march.tables.output.shape[2] // SAMPLES_AT_ONCE
+    width, point = whole_rows(n_row), np.zeros((SAMPLES_AT_ONCE, 2, m))
+    point[..., :used] = rng.standard_normal((SAMPLES_AT_ONCE, 2, used))
+    known = point.reshape(SAMPLES_AT_ONCE, -1) @ march.tables.output[mode, :, :n_row]
+    for count in (1, 2, 7, 8):
+        value = np.full((SAMPLES_AT_ONCE, width), np.nan)
+        read_rows(transitions.value[transitions.output[mode] :], width, used, m, point, count, value.ravel())
+        found = value[:count, :n_row]
+        np.testing.assert_allclose(found, known[:count], rtol=0.0, atol=1e-12 * np.abs(known).max())
+
+
+def test_a_record_measures_alike_with_tables_and_without(settled):
+    state, found = settled.final(), []
+    for met in (settled._met, None):
+        march = whip(settled.setup)
+        march._met = met
+        march.start_again(state)
+        samples, accumulator = empty_samples(march.n_place, 2 * PER_REVOLUTION), new_accumulator(3)
+        assert march.advance(0, 2 * PER_REVOLUTION, samples, accumulator, is_recorded=True) is None
+        found.append((samples, accumulator))
+    (samples, sums), (plain, known) = found
+    assert known.friction_work.all()
+    assert sums.friction_work == pytest.approx(known.friction_work, rel=1e-5)
+    assert sums.energy == pytest.approx(known.energy, rel=1e-5)
+    for name in ("impulse", "contact_time", "stick_time", "peak_force", "highest", "lowest", "peak_lateral"):
+        assert getattr(sums, name) == pytest.approx(getattr(known, name), rel=1e-7), name
+    assert sums.least_slip == pytest.approx(known.least_slip, abs=1e-6)
+    size = np.abs(plain.whole).max(axis=1, keepdims=True)
+    assert np.all(np.abs(samples.whole - plain.whole) <= 1e-7 * size)
 
 
 def test_a_case_goes_on_alike_with_tables_and_without(settled):
