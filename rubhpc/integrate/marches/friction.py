@@ -161,6 +161,12 @@ class FrictionMarch(EventDrivenMarch):
         super().find_wanted()  # the mode wanted may take the other's place
         both = growing, self.exponents(wanted)
         self._met.tabulate(left, self._tables_of(wanted), both, self.bodies, self._friction)
+        for before, after in self._met.nearly_due():  # each would end a kernel call
+            self.find(before)
+            self.find(after)
+            modes = self._tables_of(before), self._tables_of(after)
+            both = self.exponents(before), self.exponents(after)
+            self._met.tabulate(*modes, both, self.bodies, self._friction)
 
     def _tables_of(self, mask: int, *, is_copied: bool = False) -> ModeTables:
         """The tables (1, ...) of a set of states that they hold."""

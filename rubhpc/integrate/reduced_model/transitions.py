@@ -130,6 +130,13 @@ class MetTransitions:
             self._entry[before, after] = passed = passed - 1
         return passed == UNKNOWN - WORTH_A_TABLE and self._n_byte <= MOST_BYTES
 
+    def nearly_due(self) -> list[tuple[int, int]]:
+        """Transitions that have come half as often as one with a table, which soon want theirs."""
+        if self._n_byte > MOST_BYTES:
+            return []
+        most, half = UNKNOWN - WORTH_A_TABLE, UNKNOWN - WORTH_A_TABLE // 2
+        return sorted(masks for masks, passed in self._entry.items() if most < passed <= half)
+
     def tabulate(
         self,
         before: ModeTables,
