@@ -18,7 +18,7 @@ from rubhpc.kernels.curved_contact import (
     is_closed,
 )
 from rubhpc.kernels.curved_forces import fill_geometry, read_motion
-from rubhpc.kernels.event_steps import GAP_TOLERANCE
+from rubhpc.kernels.mode_change import GAP_TOLERANCE
 
 Floats = NDArray[np.float64]
 

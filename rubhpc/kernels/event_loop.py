@@ -41,7 +41,6 @@ from rubhpc.kernels.contact_modes import (
     propagate,
 )
 from rubhpc.kernels.event_steps import (
-    GAP_TOLERANCE,
     choose_step,
     contact_age,
     end_record,
@@ -54,7 +53,7 @@ from rubhpc.kernels.event_steps import (
     sample_step,
 )
 from rubhpc.kernels.measuring import begin_contact, begin_span, observe_step, resolved_contact
-from rubhpc.kernels.mode_change import change_contacts, product
+from rubhpc.kernels.mode_change import GAP_TOLERANCE, change_contacts, product
 from rubhpc.kernels.penalty_events import change_pressed
 from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.trail import Trail, no_trail, note_after, note_event, note_piece

@@ -16,9 +16,9 @@ from rubhpc.kernels._jit import jit_inline_sum, short_loops
 from rubhpc.kernels.contact_modes import ModeTables, dot
 from rubhpc.kernels.coordinate_steps import go_on, leading_level
 from rubhpc.kernels.event_bounds import FREE
-from rubhpc.kernels.event_steps import GAP_TOLERANCE
 from rubhpc.kernels.friction_coordinates import used_width
 from rubhpc.kernels.friction_states import OPEN, STUCK, FrictionBodies, state_of, stuck_pairs
+from rubhpc.kernels.mode_change import GAP_TOLERANCE
 
 if TYPE_CHECKING:
     from rubhpc.kernels.case_progress import Clock

@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-GAP_TOLERANCE = 1e-13  # m
-
 
 @jit_part_sum
 def enter_wanted(

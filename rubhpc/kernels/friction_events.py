@@ -26,7 +26,7 @@ from rubhpc.kernels.event_forces import (
     solve_expected,
 )
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, FrictionBodies, state_of
-from rubhpc.kernels.mode_change import AT_REST, OPENING, product
+from rubhpc.kernels.mode_change import AT_REST, OPENING, least_flight, product
 
 Floats = NDArray[np.float64]
 
@@ -167,9 +167,10 @@ def part_pairs(bodies: FrictionBodies, moment: float, cosine: float, sine: float
     for i in range(q):
         if solver.gap[i] < np.inf:
             opening, rate = rate_without_forces(bodies, i, cosine, sine, work), work.rate[i]
+            time = least_flight(opening, moment)
             # A pair that parts so slowly that it is pressed together again at once has not parted.
-            if rate <= OPENING + max(-opening, 0.0) * moment:
-                solver.gap[i] = opening + (rate / moment if abs(rate) > OPENING else 0.0)
+            if rate <= OPENING + max(-opening, 0.0) * time:
+                solver.gap[i] = opening + (rate / time if abs(rate) > OPENING else 0.0)
                 along = rate_without_forces(bodies, q + i, cosine, sine, work)
                 solver.slip[i] = work.slip[i] / moment + along
             else:

@@ -21,6 +21,19 @@ Floats = NDArray[np.float64]
 
 OPENING = 1e-9  # m/s, above which a pair parts
 AT_REST = 1e-12  # m/s, of gaps that stay closed
+GAP_TOLERANCE = 1e-13  # m, of overlap, above which a gap has closed
+HIDDEN = 8.0 * GAP_TOLERANCE  # m, first speed squared over deceleration of a flight four tolerances high
+
+
+@jit_inline_sum
+def least_flight(acceleration: float, moment: float) -> float:
+    """Time (s) within which a pair that parts has to be pressed together to count as closed.
+
+    It is `moment` (s) or longer. A flight within the tolerance of gaps would end at a speed due to that, and
+    two pairs that throw each other open would never come to rest. The acceleration (m/s2) is the gap's.
+    """
+    pressed = max(-acceleration, 0.0)
+    return float(np.sqrt(HIDDEN / pressed)) if 0.0 < pressed * moment * moment < HIDDEN else moment
 
 
 @jit_inline_sum
@@ -90,7 +103,8 @@ def change_contacts(
                     - product(reduced.damping[k], velocity)
                 )
             # A pair that parts so slowly that it is pressed together again at once counts as closed.
-            if product(reduced.gap_jacobian[i], velocity) <= OPENING + max(-acceleration, 0.0) * moment:
+            time = least_flight(acceleration, moment)
+            if product(reduced.gap_jacobian[i], velocity) <= OPENING + max(-acceleration, 0.0) * time:
                 speed[i] = acceleration
         active[i] = speed[i] < 0.0
     pivots = solve_complementarity(reduced.delassus, speed, 1e-12, force, active, elimination)

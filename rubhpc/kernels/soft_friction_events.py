@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import jit_lean_sum
 from rubhpc.kernels.contact_modes import Reduced  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.event_forces import FrictionWork  # noqa: TC001 - likewise
-from rubhpc.kernels.event_steps import GAP_TOLERANCE
 from rubhpc.kernels.friction_states import (
     BACKWARD,
     FORWARD,
@@ -22,6 +21,7 @@ from rubhpc.kernels.friction_states import (
     lifted_place,
     state_of,
 )
+from rubhpc.kernels.mode_change import GAP_TOLERANCE
 from rubhpc.kernels.penalty_events import force_of, gap_of
 
 Floats = NDArray[np.float64]

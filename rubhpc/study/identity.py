@@ -26,13 +26,13 @@ PHYSICS = 24  # version of the physics: raised whenever a study gives other resu
 MODAL = 5  # method = "modal": modes kept, `modal_error`, and last bits of multipliers
 DIRECT = 7  # transient = "direct"
 CHANGING_SPEED = 31  # run-ups and drives
-COULOMB = 22  # set-valued friction
+COULOMB = 23  # set-valued friction
 PENALTY = 1  # method = "modal" with a penalty, for whose sake modes are kept
 SOFT_FRICTION = 1  # a penalty with set-valued friction
 CURVED = 10  # method = "modal" with gaps that are curved
-RESTITUTION = 1  # method = "modal" with restitution, for whose sake modes are kept
+RESTITUTION = 2  # method = "modal" with restitution, for whose sake modes are kept
 CURVED_RINGS = 1  # the same with several stators
-SEVERAL_STATORS = 3  # method = "modal" with more than one
+SEVERAL_STATORS = 4  # method = "modal" with more than one
 MANY_STATORS = 8  # more than five, whose sets of closed contacts or states may be more than 256
 BRANCHES = 10  # [branch]
 MANY_EVENTS = 2  # restitution, or method = "modal" where a case may have 200 000 events

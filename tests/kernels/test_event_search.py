@@ -7,8 +7,8 @@ import pytest
 
 from rubhpc.kernels import coordinate_steps, event_loop, event_search
 from rubhpc.kernels._jit import plain
-from rubhpc.kernels.event_steps import GAP_TOLERANCE
 from rubhpc.kernels.friction_states import FORWARD, OPEN, FrictionBodies
+from rubhpc.kernels.mode_change import GAP_TOLERANCE
 
 LEVEL, TICK = 10, 1e-6  # 1024 ticks
 N_TICK = 1 << LEVEL

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.kernels.mode_change import AT_REST, OPENING
+from rubhpc.kernels._jit import plain
+from rubhpc.kernels.mode_change import AT_REST, OPENING, least_flight
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -78,4 +79,5 @@ def _opening(case: PiecewiseMotion, piece: Piece, time: float) -> tuple[Floats, 
         - bodies.damping @ motion[n:]
     )
     opening = bodies.gap_jacobian @ free
-    return OPENING + np.maximum(-opening, 0.0) * march.moment - speed, opening
+    flight = np.array([plain(least_flight)(pull, march.moment) for pull in opening.tolist()])
+    return OPENING + np.maximum(-opening, 0.0) * flight - speed, opening

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.integrate.periodic_motions.saltation import saltate
-from rubhpc.kernels.event_steps import GAP_TOLERANCE
+from rubhpc.kernels.mode_change import GAP_TOLERANCE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -51,12 +51,14 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
+PASSING = 1e-3  # s, of short steps through events without end: hundreds of periods of what bounces so fast
+
 
 class FrictionMarch(EventDrivenMarch):
     """A case whose pairs open, slide in either sense and stick.
 
-    Where events follow one another without end, or no forces obey the laws, up to a revolution is taken in
-    short steps; then the case goes on from event to event.
+    Where events follow one another without end, or no forces obey the laws, a millisecond is taken in short
+    steps; then the case goes on from event to event.
     """
 
     most_pairs = MOST_PAIRS
@@ -324,25 +326,40 @@ class FrictionMarch(EventDrivenMarch):
         self._steps = self._steps or self._make_steps()
         self.n_left += 1
         clock = self.clock
-        self._n_short = clock.samples_per_revolution << clock.sample_level
+        self._n_short = self._passing()
         self._work.trail.n_event[0] = BROKEN
         follow(self._steps.progress, self.progress)
         self._steps.take_over(clock, self._recorder, self._motion)
 
+    def _passing(self) -> int:
+        """Ticks to be taken in short steps: a millisecond, at most a revolution."""
+        clock = self.clock
+        return min(clock.samples_per_revolution << clock.sample_level, max(1, round(PASSING / clock.tick)))
+
     def _step_on(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
-        """Short steps as far as they are to go; then the states that go on are wanted."""
-        steps, before = self._steps, int(self.progress.tick)
+        """Short steps as far as they are to go, or on until states go on; then these are wanted."""
+        steps = self._steps
         assert steps is not None
-        stop = min(last_tick, before + self._n_short)
-        outcome = steps.step_to(stop, self.clock, samples, accumulator, is_recorded)
-        follow(self.progress, steps.progress)
-        self._n_short -= int(self.progress.tick) - before
-        if outcome == FINISHED:
-            self._n_short = 0
+        while True:
+            before = int(self.progress.tick)
+            outcome = steps.step_to(
+                min(last_tick, before + self._n_short), self.clock, samples, accumulator, is_recorded
+            )
+            follow(self.progress, steps.progress)
+            self._n_short -= int(self.progress.tick) - before
+            if outcome != FINISHED:
+                return outcome
             self._motion[:] = steps.motion_of(steps.progress, steps.coordinates)
             angle = shaft_angle(self.clock, self.progress.tick)
-            ask_for(self.progress, self._states_after(steps.touching(), angle))
-        return outcome
+            try:
+                ask_for(self.progress, self._states_after(steps.touching(), angle))
+            except NoClosedForm:
+                if self.progress.tick >= last_tick:
+                    raise
+                self._n_short = self._passing()
+            else:
+                self._n_short = 0
+                return outcome
 
     def _unsolved(self) -> str:
         return NO_FORCES

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels.case_progress import NONE
-from rubhpc.kernels.event_steps import GAP_TOLERANCE
 from rubhpc.kernels.flow import PieceTables
+from rubhpc.kernels.mode_change import GAP_TOLERANCE
 from rubhpc.kernels.revolutions import PieceModes
 
 if TYPE_CHECKING:
