@@ -25,7 +25,7 @@ PHYSICS = 24  # version of the physics: raised whenever a study gives other resu
 # Versions of what only some studies take, raised in place of PHYSICS and added to it for these.
 MODAL = 5  # method = "modal": modes kept, `modal_error`, and last bits of multipliers
 DIRECT = 7  # transient = "direct"
-CHANGING_SPEED = 31  # run-ups and drives
+CHANGING_SPEED = 32  # run-ups and drives
 COULOMB = 23  # set-valued friction
 PENALTY = 1  # method = "modal" with a penalty, for whose sake modes are kept
 SOFT_FRICTION = 1  # a penalty with set-valued friction

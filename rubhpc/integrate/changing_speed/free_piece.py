@@ -44,6 +44,9 @@ DRIVEN_LAG = 0.25 * LAG  # rad, deviation of the shaft's angle; the twist depend
 # many times, down to this part of a revolution.
 UNEVEN, SHORTEST = 25.0, 4
 GUESSED = 0.005 * LAG  # rad, deviation of the shaft's angle from that with the guessed acceleration
+# Change of speed without the damping by a torque that falls with the speed, over that with it: from which the
+# first guess counts it, and up to which a piece need not be halved.
+STEEP, STEEPEST = 1.1, 2.5
 MOST_TRIES = 4  # tries of a piece before it is halved
 
 
@@ -107,8 +110,12 @@ class Spin:
         first, last = (2.0 * math.pi * i / per_revolution for i in (at, at + length))
         last_turn, may_be_halved = self._last_turn, not is_fixed and length % 2 == 0
         brake = last_turn.torque(at, length)
-        acceleration = (drive.at(self.speed) - brake) / inertia
-        acceleration = (drive.at(self._after(acceleration, 0.5 * turned)) - brake) / inertia
+        steep = 1.0 + max(-drive.slope(self.speed), 0.0) * turned / (2.0 * inertia * self.speed)
+        acceleration = (drive.at(self.speed) - brake) / (inertia * steep)
+        if steep < STEEP:
+            acceleration = (drive.at(self._after(acceleration, 0.5 * turned)) - brake) / inertia
+        if may_be_halved and steep > STEEPEST:
+            return None
         if may_be_halved:
             foreseen = UNEVEN * last_turn.rubbed(at, length) / (turned * inertia)
             if _is_uneven(foreseen, turned / self.speed, length, per_revolution):
@@ -165,7 +172,10 @@ class Spin:
             error = abs(change / duration - acceleration) * duration**2 / 12.0
             if error <= GUESSED or (is_fixed and tried == MOST_TRIES - 1):
                 break
-            acceleration = change / duration
+            # A torque that falls with the speed by more than a fraction of it would let the guesses diverge.
+            acceleration += (change / duration - acceleration) / (
+                1.0 + max(-slope, 0.0) * duration / (2.0 * inertia)
+            )
         else:
             if length % 2 == 0:
                 return None
