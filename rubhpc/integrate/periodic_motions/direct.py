@@ -43,6 +43,7 @@ LOST = 3 / 4  # of what the linear theory takes from its distance, that it loses
 FAR = 1e-2  # of the square of its distance, until which the linear theory must keep its contacts
 AGAIN = 0.7  # of that square, at which they are looked at once more
 STRAYS = 0.3  # of its distance a period before: a case that strays less may follow the linear theory
+LEFT = 1.0  # of that distance: a case that strays more knows nothing of the motion
 MOST_EVENTS = 24, 8  # in a revolution: of one pair, and more for each further one
 
 
@@ -86,6 +87,9 @@ def pass_directly(
             continue
         for candidate in _candidates(piecewise, walk, missed):
             orbit = candidate.orbit
+            if candidate.strays(walk.passed) > LEFT:
+                candidate.n_missed += 1
+                continue
             is_near, reason = draws_near(walk, candidate, int(FURTHER * walk.n_revolution))
             if is_near and known is not None and (same := known.nearest(orbit.motion, SAME)) is not None:
                 return walk.ended(reason, same)
