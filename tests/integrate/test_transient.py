@@ -136,6 +136,19 @@ def test_direct_way_takes_up_a_motion_that_it_found_too_early(monkeypatch):
     assert min(away) < 2e-7 * np.abs(settled.section_vertical).max()
 
 
+def test_direct_way_does_not_watch_a_motion_that_the_case_knows_nothing_of(monkeypatch):
+    """Period 1 is found first, and the case strays from it by more than its distance."""
+    solved, watched = [], []
+    shoot, watch = direct.shoot, direct.draws_near
+    monkeypatch.setattr(direct, "shoot", lambda *a, **k: (solved.append(a[3]), shoot(*a, **k))[1])
+    monkeypatch.setattr(direct, "draws_near", lambda *a: (watched.append(a[1].period), watch(*a))[1])
+    case = {"speed_ratio": 0.9, "clearance_ratio": 0.523, "friction": 0.3} | LIGHT
+    case["overrides"] = {"rotor.damping.alpha": 0.8}
+    found = simulate("mokhtar2017", transient="direct", transient_limit=1000, **case)
+    assert found.period == 3
+    assert (solved, watched) == ([1, 3], [3])
+
+
 def test_direct_way_meets_a_motion_that_is_reached_exactly():
     """Without contact; the linear theory leaves a distance of 0 to the last bit."""
     case = {"speed": 70.5, "clearance": "100 um", "samples_per_revolution": 1024, "revolutions": 1}
