@@ -16,6 +16,7 @@ from rubhpc.kernels._jit import jit_inline, jit_inline_sum, jit_lean
 from rubhpc.kernels.complementarity import UNSOLVED, solve_active
 from rubhpc.kernels.contact_pairs import Workspace  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.coulomb_friction import ROUNDING, UNNOTICED, solve_cones
+from rubhpc.kernels.earlier_spans import EarlierSpans, no_earlier_spans
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, FrictionBodies, state_of
 from rubhpc.kernels.trail import Trail, no_trail
 
@@ -36,6 +37,7 @@ class FrictionWork(NamedTuple):
     free_until: NDArray[
         np.int64
     ]  # (2, 2 q), what is known of the switch functions: `event_bounds.free_until`
+    earlier: EarlierSpans  # with which spans are compared
     impulse: Floats  # (q,), accumulated before the event, N s
     rest: Floats  # (2 q, 2 q), rates of the gaps, then slips, by impulses along them, 1/kg
     rest_speed: Floats  # (2 q,), m/s
@@ -55,6 +57,7 @@ def friction_work(solver: Workspace, q: int, n: int) -> FrictionWork:
         given=np.zeros((2, q)),
         kick=np.zeros(n),
         free_until=np.zeros((2, 2 * q), dtype=np.int64),
+        earlier=no_earlier_spans(),
         impulse=np.zeros(q),
         rest=np.zeros((2 * q, 2 * q)),
         rest_speed=np.zeros(2 * q),

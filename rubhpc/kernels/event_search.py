@@ -27,6 +27,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 NEWTON_TRIES = 6  # places tried before the bracket is halved instead
+DOUBTFUL = 0.01  # of what a function changes by in a tick: one that is nearer to zero may be on either side
 KNOWN_BITS = 4  # of the first of them, behind the first bit
 
 
@@ -64,28 +65,6 @@ def find_change(
 
 
 @jit_inline_sum
-def changes_at(tables: ModeTables, mode: int, z: Floats, overlap: float, tick: int, known: Ints) -> int:
-    """Bits of the switch functions that are negative at coordinates (2, m)."""
-    used = used_width(tables, mode)
-    z_re, z_im = z[0, :used], z[1, :used]
-    return int(
-        find_change(
-            tables.mask[mode],
-            mode,
-            tables.switch_re,
-            tables.switch_im,
-            z_re,
-            z_im,
-            tables.rate_re,
-            tables.rate_im,
-            overlap,
-            tick,
-            known,
-        )
-    )
-
-
-@jit_inline_sum
 def move_ticks(
     tables: ModeTables, bodies: FrictionBodies, mode: int, count: int, tick: float, z: Floats, target: Floats
 ) -> None:
@@ -118,16 +97,46 @@ def move_stuck(states: int, n_eigenmode: int, rim_speed: Floats, time: float, z_
 
 @jit_inline_sum
 @short_loops
-def root_ahead(
-    tables: ModeTables, mode: int, crossing: int, tick: float, z_re: Floats, z_im: Floats
-) -> float:
-    """Ticks (s) to the first root of the switch functions `crossing`, by parabolas at coordinates (m,).
+def look_ahead(
+    tables: ModeTables,
+    mode: int,
+    crossing: int,
+    overlap: float,
+    tick: float,
+    place: int,
+    known: Ints,
+    z_re: Floats,
+    z_im: Floats,
+) -> tuple[int, int, bool, float]:
+    """What the switch functions are about to do at coordinates (m,), by their parabolas there.
 
-    Negative where it lies behind, -inf where none is found.
+    Parameters
+    ----------
+    crossing : int
+        Bits of those whose root is wanted where none is negative.
+    tick : float, s
+    place : int
+        Tick at which the coordinates stand.
+    known : (2, 2 q)
+        As `find_change` reads it, a tick later.
+
+    Returns
+    -------
+    int
+        Bits of those that are negative, as of `find_change`.
+    int
+        Bits of those that are so a tick later.
+    bool
+        Whether that is beyond doubt.
+    float
+        Ticks to the first root, of the first of these that there are any of, or of `crossing`: negative where
+        it lies behind, -inf where none is found.
     """
-    states, found = tables.mask[mode], np.inf
+    states, found, soon, is_clear = tables.mask[mode], int(np.int64(0)), int(np.int64(0)), True
+    behind, ahead = np.inf, np.inf
     for j in range(tables.switch_re.shape[1]):
-        if (crossing >> j) & 1 == 0:
+        is_open = state_of(states, j // 2) == OPEN
+        if (is_open and j % 2 == 1) or known[FREE, j] > place:
             continue
         re, im, turning_re, turning_im, bending_re, bending_im = (
             tables.switch_re[mode, j],
@@ -143,10 +152,18 @@ def root_ahead(
             value += re[k] * a - im[k] * b
             rate += turning_re[k] * a - turning_im[k] * b
             bend += bending_re[k] * a - bending_im[k] * b
-        value += GAP_TOLERANCE if state_of(states, j // 2) == OPEN else 0.0
+        value += GAP_TOLERANCE if is_open else 0.0
+        later = value + tick * (rate + 0.5 * tick * bend)
         root = np.sqrt(max(rate * rate - 2.0 * bend * value, 0.0))
-        found = min(found, 2.0 * value / (root - rate) if rate < 0.0 else -np.inf)
-    return found / tick
+        root = 2.0 * value / (root - rate) if rate < 0.0 else -np.inf
+        if value < 0.0 and (not is_open or rate < 0.0 or value < GAP_TOLERANCE - overlap):
+            found, behind = found | 1 << j, min(behind, root)
+        elif (crossing >> j) & 1 == 1:
+            ahead = min(ahead, root)
+        if later < 0.0 and (not is_open or rate < 0.0 or later < GAP_TOLERANCE - overlap):
+            soon |= 1 << j
+        is_clear = is_clear and abs(later) > DOUBTFUL * tick * abs(rate)
+    return found, soon, is_clear, (behind if found != 0 else ahead) / tick
 
 
 @jit_inline_sum
@@ -231,16 +248,20 @@ def approach_change(
             if tried == 1:  # no more digits than are known
                 place = max(place - place % (1 << leading_level(max(1, place >> KNOWN_BITS))), 1)
         move_ticks(tables, bodies, mode, place - before, clock.tick, z, work)
-        found = changes_at(tables, mode, work, overlap, now + place, known)
+        found, soon, is_clear, root = look_ahead(
+            tables, mode, crossing, overlap, clock.tick, now + place, known, work_re, work_im
+        )
         crossing = found if found != 0 else crossing
-        # Where the root is between this tick and the next one, that is looked at; then this.
-        root = place + root_ahead(tables, mode, crossing, clock.tick, work_re, work_im)
+        root += place
         if found != 0:
             after = place
             continue
         before = place
         for k in range(used):
             z_re[k], z_im[k] = work_re[k], work_im[k]
+        if soon != 0 and is_clear:
+            return before, soon
+        # Where the root is between this tick and the next one, that is looked at; then this.
         if place <= root < place + 1.0:
             root = place + 1.0
     return before, crossing

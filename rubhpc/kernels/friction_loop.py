@@ -24,9 +24,10 @@ from rubhpc.kernels.case_progress import (
     Clock,
     Progress,
 )
-from rubhpc.kernels.contact_modes import ModeTables, Reduced  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.contact_modes import FORCED_LEVEL, ModeTables, Reduced
 from rubhpc.kernels.coordinate_steps import go_on, leading_level, turn_on
-from rubhpc.kernels.event_bounds import free_until
+from rubhpc.kernels.earlier_spans import begin_bounds, end_bounds, go_on_without
+from rubhpc.kernels.event_bounds import FEW_BITS, WORTH_ASKING, compared_until, free_until
 from rubhpc.kernels.event_forces import FrictionWork  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.event_search import approach_change, find_change, move_stuck
 from rubhpc.kernels.event_steps import choose_step, end_samples
@@ -44,9 +45,6 @@ if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
 
 Floats = NDArray[np.float64]
-
-FEW_BITS = 2  # of a count of ticks, behind the first
-WORTH_ASKING = 4  # of an interval free of events: its last share, in which it is bounded anew
 
 
 @jit_lean_sum
@@ -83,7 +81,7 @@ def advance_with_friction(
     rate_re, rate_im = tables.rate_re, tables.rate_im
     bend_re, bend_im, turn = tables.bend_re, tables.bend_im, tables.turn
     power_re, power_im, n_eigenmode = tables.power_re, tables.power_im, tables.n_eigenmode
-    rim_speed = bodies.rim_speed
+    pace, rim_speed = tables.pace, bodies.rim_speed
     overlap = reduced.overlap
     highest_level = power_re.shape[1] - 1
     if is_recorded:  # spans have room for some samples
@@ -91,6 +89,8 @@ def advance_with_friction(
     last_step = progress.n_step + MOST_STEPS
     progress.halving_level, progress.is_after_event = NONE, 0
     is_new = True  # the contact mode, to this call
+    earlier = work.earlier
+    go_on_without(earlier)
     while True:
         if progress.wanted >= 0:
             if not enter_states(tables, reduced.clearance, clock, progress, motion, z):
@@ -111,6 +111,32 @@ def advance_with_friction(
             z_re, z_im, next_re, next_im = z[0, :used], z[1, :used], z_next[0, :used], z_next[1, :used]
             if is_recorded:
                 observe_states(mask[progress.mode], accumulator)
+            if begin_bounds(
+                earlier,
+                mask[progress.mode],
+                progress.mode,
+                switch_re,
+                switch_im,
+                rate_re,
+                rate_im,
+                pace,
+                power_re,
+                power_im,
+                z_re,
+                z_im,
+                progress.tick,
+                clock.tick,
+            ):
+                free_to = sure_to = compared_until(
+                    mask[progress.mode],
+                    progress.tick + (1 << FORCED_LEVEL),
+                    1 << highest_level,
+                    work.free_until,
+                    earlier,
+                )
+                renewed_at = sure_to - (sure_to - progress.tick) // WORTH_ASKING
+                if sure_to > progress.tick + (2 << FORCED_LEVEL):
+                    progress.is_after_event = 0  # no step without a bound is needed
         if is_recorded and progress.energy_from < 0:
             begin_span(recorder.spans, z)
             progress.energy_from = progress.tick
@@ -146,6 +172,7 @@ def advance_with_friction(
                     1 << clock.search_level,
                     1 << highest_level,
                     work.free_until,
+                    earlier,
                 )
                 renewed_at = sure_to - (sure_to - progress.tick) // WORTH_ASKING
             is_forced = progress.is_after_event == 1
@@ -219,6 +246,7 @@ def advance_with_friction(
                 end_samples(tables, clock, is_sample, z, progress, recorder, samples, accumulator)
             return FINISHED
         if crossing != 0:  # within the next tick
+            end_bounds(earlier, mask[progress.mode], progress.tick)
             outcome = take_change(
                 tables,
                 reduced,

@@ -26,7 +26,7 @@ PHYSICS = 24  # version of the physics: raised whenever a study gives other resu
 MODAL = 5  # method = "modal": modes kept, `modal_error`, and last bits of multipliers
 DIRECT = 8  # transient = "direct"
 CHANGING_SPEED = 32  # run-ups and drives
-COULOMB = 23  # set-valued friction
+COULOMB = 24  # set-valued friction
 PENALTY = 1  # method = "modal" with a penalty, for whose sake modes are kept
 SOFT_FRICTION = 1  # a penalty with set-valued friction
 CURVED = 10  # method = "modal" with gaps that are curved

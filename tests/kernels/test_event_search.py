@@ -15,9 +15,8 @@ N_TICK = 1 << LEVEL
 BODIES = FrictionBodies(np.zeros(1), np.zeros(1), np.zeros(1), np.zeros((2, 0)), np.zeros((2, 2)))
 NAMES = (
     "root_between",
-    "root_ahead",
+    "look_ahead",
     "move_ticks",
-    "changes_at",
     "find_change",
     "go_on",
     "dot",
@@ -60,6 +59,13 @@ def values_of(exponents, rows, ticks):
     return (rows @ np.exp(np.outer(exponents, TICK * ticks))).real
 
 
+def changes_at(tables, z, overlap, known):
+    """Bits of the switch functions that are negative at coordinates (2, m)."""
+    switch, rate = (tables.switch_re, tables.switch_im), (tables.rate_re, tables.rate_im)
+    given = (tables.mask[0], 0, *switch, *z, *rate, overlap, N_TICK, known)
+    return plain(event_search.find_change)(*given)
+
+
 def search(exponents, rows, state=FORWARD):
     """Ticks passed, and what is negative a tick later; coordinates stand at that tick."""
     tables = tables_of(exponents, rows, state)
@@ -67,7 +73,7 @@ def search(exponents, rows, state=FORWARD):
     end = np.empty((2, exponents.size))
     plain(event_search.move_ticks)(tables, BODIES, 0, N_TICK, TICK, z, end)
     known = np.zeros((2, 2), dtype=np.int64)
-    crossing = plain(event_search.changes_at)(tables, 0, end, GAP_TOLERANCE, N_TICK, known)
+    crossing = changes_at(tables, end, GAP_TOLERANCE, known)
     assert crossing != 0
     clock = SimpleNamespace(tick=TICK)
     passed, crossing = plain(event_search.approach_change)(
@@ -163,7 +169,9 @@ def test_overlap_of_an_open_pair(exponent, overlap, is_seen, monkeypatch):
     tables = tables_of(np.array([exponent]), np.array([[-1e-6], [1.0]]), OPEN)
     z = np.array([[1.0], [0.0]])
     known = np.zeros((2, 2), dtype=np.int64)
-    assert plain(event_search.changes_at)(tables, 0, z, overlap, N_TICK, known) == is_seen
+    assert changes_at(tables, z, overlap, known) == is_seen
+    found, soon, *_ = plain(event_search.look_ahead)(tables, 0, 0, overlap, 1e-30, N_TICK, known, *z)
+    assert found == soon == is_seen
     monkeypatch.setattr(event_loop, "dot", plain(event_loop.dot))
     rows = [part[:, :1] for part in (tables.switch_re, tables.switch_im, tables.rate_re, tables.rate_im)]
     assert plain(event_loop.find_crossing)(0, 0, *rows, z[0], z[1], overlap) == is_seen

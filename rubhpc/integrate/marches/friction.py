@@ -24,6 +24,7 @@ from rubhpc.kernels.case_progress import (
     shaft_angle,
 )
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE, ModeTables
+from rubhpc.kernels.earlier_spans import earlier_spans, forget_earlier, no_earlier_spans
 from rubhpc.kernels.event_forces import friction_work
 from rubhpc.kernels.friction_change import change_states
 from rubhpc.kernels.friction_loop import advance_with_friction
@@ -63,6 +64,7 @@ class FrictionMarch(EventDrivenMarch):
 
     most_pairs = MOST_PAIRS
     take_change = staticmethod(change_states)
+    _no_earlier = no_earlier_spans()
 
     def __init__(
         self,
@@ -85,6 +87,7 @@ class FrictionMarch(EventDrivenMarch):
     def begin(self, setup: ModalSetup, place: Place) -> None:
         """Begin anew at another speed, each pressed pair in the state that its forces give."""
         self._steps, self._n_short = None, 0
+        forget_earlier(self._work.earlier)
         super().begin(setup, place)
 
     def moved_by(self, mask: int) -> int:
@@ -94,6 +97,7 @@ class FrictionMarch(EventDrivenMarch):
     def start_again(self, state: State) -> bool:
         """Start the same case anew at another state, with the contact modes that it has met."""
         self._n_short = 0
+        forget_earlier(self._work.earlier)
         return super().start_again(state)
 
     @property
@@ -189,6 +193,8 @@ class FrictionMarch(EventDrivenMarch):
     def _use(self, tables: ModeTables) -> None:
         super()._use(tables)
         self._transitions = None
+        if self._work.earlier.moved.size != self._z.shape[1]:
+            self._work = self._work._replace(earlier=earlier_spans(self._z.shape[1], self._clearance.size))
         if self._recorder.spans.path.shape[1:] != self._z.shape:
             n_row = self._recorder.value.size // SAMPLES_AT_ONCE
             spans = new_spans(self._z.shape[1], self._clearance.size, n_row)
@@ -314,7 +320,7 @@ class FrictionMarch(EventDrivenMarch):
             self._z,
             self._z_next,
             self._motion,
-            self._work,
+            self._work._replace(earlier=self._no_earlier),  # a mode is another one in the next piece
             self._recorder,
             samples,
             sums,
