@@ -59,45 +59,6 @@ def go_on(
 
 @jit_apart_sum
 @short_loops
-def turn_both(
-    count: int,
-    power_re: Floats,
-    power_im: Floats,
-    d_re: Floats,
-    d_im: Floats,
-    z_re: Floats,
-    z_im: Floats,
-) -> None:
-    """Advance two sets of modal coordinates (m,) by `count` ticks in place, as `turn_on`."""
-    level, rest = 0, count
-    while rest != 0:
-        shift = lowest_level(rest)
-        level, rest = level + shift, rest >> (shift + 1)
-        a_re, a_im = power_re[level], power_im[level]
-        level += 1
-        if rest == 0:
-            for k in range(z_re.size):
-                x, y, u, v = z_re[k], z_im[k], d_re[k], d_im[k]
-                z_re[k] = a_re[k] * x - a_im[k] * y
-                z_im[k] = a_re[k] * y + a_im[k] * x
-                d_re[k] = a_re[k] * u - a_im[k] * v
-                d_im[k] = a_re[k] * v + a_im[k] * u
-            return
-        shift = lowest_level(rest)
-        level, rest = level + shift, rest >> (shift + 1)
-        b_re, b_im = power_re[level], power_im[level]
-        level += 1
-        for k in range(z_re.size):
-            re, im = a_re[k] * b_re[k] - a_im[k] * b_im[k], a_re[k] * b_im[k] + a_im[k] * b_re[k]
-            x, y, u, v = z_re[k], z_im[k], d_re[k], d_im[k]
-            z_re[k] = re * x - im * y
-            z_im[k] = re * y + im * x
-            d_re[k] = re * u - im * v
-            d_im[k] = re * v + im * u
-
-
-@jit_apart_sum
-@short_loops
 def turn_on(count: int, power_re: Floats, power_im: Floats, z_re: Floats, z_im: Floats) -> None:
     """Advance modal coordinates (m,) by `count` ticks in place, as `go_on`."""
     level, rest = 0, count

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.complementarity import solve_active
 from rubhpc.kernels.contact_modes import ModeTables, Reduced, add_rows, dot, floor_log2
-from rubhpc.kernels.coordinate_steps import turn_both
+from rubhpc.kernels.coordinate_steps import turn_on
 from rubhpc.kernels.mode_change import AT_REST, product
 from rubhpc.kernels.trail import Trail  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.transitions import UNKNOWN, Transitions, add_impulses, pass_over, see
@@ -148,16 +148,11 @@ def carry_along(
         crossing = trail.crossing[k]
         is_touching = crossing & modes.opened[which] != 0
         shift, cosine_rate, sine_rate = 0.0, 0.0, 0.0
-        is_alike = modes.has_states and reached[PASSED] == begun
-        if not is_alike:
-            move(tables, place, end - reached[PASSED], d)
+        move(tables, place, end - reached[PASSED], d)
         reached[PASSED] = end
         if modes.has_states or is_touching:  # else a release with continuous forces
             read_begun(trail, k, z)
-            if is_alike:
-                move_both(tables, place, end - begun, d, z)
-            else:
-                move(tables, place, end - begun, z)
+            move(tables, place, end - begun, z)
             for i in range(z.shape[1]):
                 z[0, i] += drift[i] * (end - begun) * tick
             j = floor_log2(crossing & -crossing)
@@ -197,26 +192,9 @@ def carry_along(
 def move(tables: ModeTables, place: int, n_tick: int, z: Floats) -> None:
     """Advance coordinates (2, m) by `n_tick` ticks."""
     power_re, power_im = tables.power_re[place], tables.power_im[place]
-    highest = power_re.shape[0] - 1
-    z_re, z_im = z[0], z[1]
-    left = n_tick
-    while left > 0:
-        level = min(highest, floor_log2(left))
-        left -= 1 << level
-        re, im = power_re[level], power_im[level]
-        for i in range(z_re.size):
-            a, b = z_re[i], z_im[i]
-            z_re[i] = re[i] * a - im[i] * b
-            z_im[i] = re[i] * b + im[i] * a
-
-
-@jit_lean_sum
-def move_both(tables: ModeTables, place: int, n_tick: int, d: Floats, z: Floats) -> None:
-    """Advance two sets of coordinates (2, m) by `n_tick` ticks."""
-    power_re, power_im = tables.power_re[place], tables.power_im[place]
     most, left = (1 << power_re.shape[0]) - 1, n_tick
     while left > 0:
-        turn_both(min(left, most), power_re, power_im, d[0], d[1], z[0], z[1])
+        turn_on(min(left, most), power_re, power_im, z[0], z[1])
         left -= most
 
 

@@ -11,6 +11,7 @@ from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.marches.march import NO_FORCES
 from rubhpc.integrate.marches.met_modes import NoClosedForm
+from rubhpc.integrate.marches.short_steps import ShortSteps
 from rubhpc.integrate.marches.workspace import empty_workspace
 from rubhpc.integrate.record import State
 from rubhpc.integrate.reduced_model.friction_mode import mask_of, states_of
@@ -20,7 +21,6 @@ from rubhpc.kernels.case_progress import (
     FINISHED,
     PAUSED,
     ask_for,
-    follow,
     shaft_angle,
 )
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE, ModeTables
@@ -52,8 +52,6 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-PASSING = 1e-3  # s, of short steps through events without end: hundreds of periods of what bounces so fast
-
 
 class FrictionMarch(EventDrivenMarch):
     """A case whose pairs open, slide in either sense and stick.
@@ -75,18 +73,18 @@ class FrictionMarch(EventDrivenMarch):
         check: Callable[[], None] | None,
     ) -> None:
         """Start from `initial`, each pressed pair in the state that its forces give."""
-        self._make_steps: Callable[[], ContactSteppingMarch] = lambda: ContactSteppingMarch(
-            self._setup, clearance, friction, State.at_rest(self._setup.model), check
+        self._steps = ShortSteps(
+            lambda: ContactSteppingMarch(
+                self._setup, clearance, friction, State.at_rest(self._setup.model), check
+            )
         )
-        self._steps: ContactSteppingMarch | None = None
         self._transitions: Transitions | None = None
-        self._n_short = 0  # ticks to be taken in short steps
         self._pulled: tuple[Floats, Floats, Floats] | None = None  # stiffness, and what follows from it
         super().__init__(setup, clearance, friction, initial, check)
 
     def begin(self, setup: ModalSetup, place: Place) -> None:
         """Begin anew at another speed, each pressed pair in the state that its forces give."""
-        self._steps, self._n_short = None, 0
+        self._steps.forget()
         forget_earlier(self._work.earlier)
         super().begin(setup, place)
 
@@ -96,7 +94,7 @@ class FrictionMarch(EventDrivenMarch):
 
     def start_again(self, state: State) -> bool:
         """Start the same case anew at another state, with the contact modes that it has met."""
-        self._n_short = 0
+        self._steps.stop()
         forget_earlier(self._work.earlier)
         return super().start_again(state)
 
@@ -243,7 +241,7 @@ class FrictionMarch(EventDrivenMarch):
         )
 
     def _advance_sections(self, samples: Samples, accumulator: Accumulator, sections: Floats) -> int:
-        if self._n_short:  # some short steps before events are followed again
+        if self._steps.are_under_way:  # some short steps before events are followed again
             clock = self.clock
             per_revolution = clock.samples_per_revolution << clock.sample_level
             k = len(sections) + int(self.progress.tick) // per_revolution
@@ -281,7 +279,7 @@ class FrictionMarch(EventDrivenMarch):
 
     def _kernel(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
         while True:
-            if self._n_short:
+            if self._steps.are_under_way:
                 outcome = self._step_on(last_tick, samples, accumulator, is_recorded)
                 if outcome != FINISHED:
                     return outcome
@@ -329,42 +327,26 @@ class FrictionMarch(EventDrivenMarch):
 
     def _hand_over(self) -> None:
         """Go over to short steps, from the motion at the tick reached."""
-        self._steps = self._steps or self._make_steps()
         self.n_left += 1
-        clock = self.clock
-        self._n_short = self._passing()
         self._work.trail.n_event[0] = BROKEN
-        follow(self._steps.progress, self.progress)
-        self._steps.take_over(clock, self._recorder, self._motion)
-
-    def _passing(self) -> int:
-        """Ticks to be taken in short steps: a millisecond, at most a revolution."""
-        clock = self.clock
-        return min(clock.samples_per_revolution << clock.sample_level, max(1, round(PASSING / clock.tick)))
+        self._steps.take_over(self.clock, self.progress, self._recorder, self._motion)
 
     def _step_on(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
         """Short steps as far as they are to go, or on until states go on; then these are wanted."""
-        steps = self._steps
-        assert steps is not None
+        place = last_tick, self.clock, self.progress, samples, accumulator, self._motion
         while True:
-            before = int(self.progress.tick)
-            outcome = steps.step_to(
-                min(last_tick, before + self._n_short), self.clock, samples, accumulator, is_recorded
-            )
-            follow(self.progress, steps.progress)
-            self._n_short -= int(self.progress.tick) - before
+            outcome, is_closed = self._steps.step_to(*place, is_recorded=is_recorded)
             if outcome != FINISHED:
                 return outcome
-            self._motion[:] = steps.motion_of(steps.progress, steps.coordinates)
-            angle = shaft_angle(self.clock, self.progress.tick)
             try:
-                ask_for(self.progress, self._states_after(steps.touching(), angle))
+                states = self._states_after(is_closed, shaft_angle(self.clock, self.progress.tick))
             except NoClosedForm:
                 if self.progress.tick >= last_tick:
                     raise
-                self._n_short = self._passing()
+                self._steps.prolong(self.clock)
             else:
-                self._n_short = 0
+                self._steps.stop()
+                ask_for(self.progress, states)
                 return outcome
 
     def _unsolved(self) -> str:
