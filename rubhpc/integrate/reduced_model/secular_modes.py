@@ -177,6 +177,8 @@ class _Poles(NamedTuple):
             if np.any(shared):
                 others = self._from_others(own, distance, is_real, left[shared])
                 rate[shared] += at_zero[shared] * (inverse[shared].sum(axis=1) - others)
+            if not np.all(np.isfinite(rate)):  # two have met
+                return None
             step = at_zero / rate
             distance[left] -= step
             left = left[np.abs(step) > CONVERGED * np.abs(distance[left])]
@@ -195,7 +197,8 @@ class _Poles(NamedTuple):
         zeros = self.upper[own] + distance
         away = zeros[at, None] - np.concatenate([zeros, zeros[~is_real].conj()])
         away[np.arange(at.size), at] = np.inf
-        return np.asarray((1.0 / away).sum(axis=1))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray((1.0 / away).sum(axis=1))
 
     def _start(self, strong: Ints) -> Complexes | None:
         """First zeros among the strong poles: those of a small system, with a constant sum of the others.

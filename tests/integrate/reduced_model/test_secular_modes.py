@@ -8,7 +8,7 @@ import pytest
 from overhung_pump import SEGMENT, pump
 
 from rubhpc import LumpedStator
-from rubhpc.integrate.reduced_model import contact_mode
+from rubhpc.integrate.reduced_model import contact_mode, secular_modes
 from rubhpc.integrate.reduced_model.closings import Closings, Within
 from rubhpc.integrate.reduced_model.friction_mode import mask_of
 from rubhpc.integrate.reduced_model.secular_modes import Contact, Eigenmodes, with_contact
@@ -127,6 +127,13 @@ def test_coupled_exponents_that_coincide_are_left_to_the_whole():
         np.full(6, -1.0 + 50.0j), np.eye(6, dtype=complex), np.hstack([np.eye(6), np.eye(6)]).astype(complex)
     )
     assert with_contact(found, Contact(row, row + 0.3 * across)) is None
+
+
+def test_zeros_that_meet_are_left_to_the_whole(monkeypatch):
+    stiffness, damping, row, _ = rotor_and_stator()
+    start = secular_modes._Poles._start
+    monkeypatch.setattr(secular_modes._Poles, "_start", lambda *args: np.repeat(start(*args)[::2], 2))
+    assert with_contact(opened(stiffness, damping), Contact(row, row)) is None
 
 
 SETS = {
