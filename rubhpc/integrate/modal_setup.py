@@ -55,9 +55,9 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 L = TypeVar("L", bound=ModeLibrary)
-FINEST_TICK = 1.5e-9  # s
+FINEST_TICK = 1.9e-10  # s
 CONTACT_STEPS = 1024  # per revolution, at least, while recording a contact
-LONGEST_TURN = FINEST_TICK * 2**46  # s, a day: 64 bits count the ticks of a hundred thousand revolutions
+LONGEST_TURN = FINEST_TICK * 2**46  # s, 3.7 hours: 64 bits count the ticks of a hundred thousand revolutions
 FEWEST_STEPS = 16  # per revolution, at least
 
 

@@ -69,7 +69,7 @@ def prepare(
         if 2.0 * math.pi / abs(speed) > LONGEST_TURN:
             least = 2.0 * math.pi / LONGEST_TURN
             raise InputError(
-                f"speed: {speed:.3g} rad/s is too slow for events timed to 1.5 ns; take {least:.1g} rad/s "
+                f"speed: {speed:.3g} rad/s is too slow for events timed to 0.19 ns; take {least:.1g} rad/s "
                 "or more"
             )
         law, is_updated = law_of(contact), contact.normal == "updated"

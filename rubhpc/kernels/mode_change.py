@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 
 OPENING = 1e-9  # m/s, above which a pair parts
 AT_REST = 1e-12  # m/s, of gaps that stay closed
-GAP_TOLERANCE = 1e-13  # m, of overlap, above which a gap has closed
+GAP_TOLERANCE = 1e-14  # m, of overlap, above which a gap has closed
 HIDDEN = 8.0 * GAP_TOLERANCE  # m, first speed squared over deceleration of a flight four tolerances high
 
 
