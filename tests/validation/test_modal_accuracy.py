@@ -109,7 +109,7 @@ def test_random_rigs_are_as_accurate_as_asked(seed):
 
 
 GROWING = [  # seed of a rig, or speed ratio and clearance (um) of the packaged one; how far neighbours part
-    (6, 1e2), (38, 1e2), (9, 1e2), (14, 1e3), (3, np.inf), (8, np.inf), (24, np.inf),
+    (6, 1e2), (38, 1e2), (9, 1e2), (14, 1e3), (24, 1e3), (3, np.inf), (8, np.inf),
     ((5.09, 70.0), 1e2), ((1.3238, 64.187), np.inf), ((2.6543, 83.518), np.inf),
 ]  # fmt: skip
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import rubhpc
+from rubhpc.integrate import modal_setup
 from rubhpc.integrate.branches.branching import Branching
 from rubhpc.integrate.branches.grazing import grazing_between, touches
 from rubhpc.integrate.branches.start import shot, simulated
@@ -59,6 +60,7 @@ damping = "20 N s/m"
 
 @pytest.fixture(scope="module")
 def branching(tmp_path_factory):
+    """With ticks of 1.5 ns, at which impacts of another send pairs away for a moment."""
     path = tmp_path_factory.mktemp("rig") / "rig.toml"
     path.write_text(RIG)
     operation = Operation(
@@ -66,7 +68,9 @@ def branching(tmp_path_factory):
         samples_per_revolution=256,
     )  # fmt: skip
     ends = (450.0, 600.0)
-    return Branching(Family(operation.at("speed", 500.0), "speed", ends), 3.0)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(modal_setup, "FINEST_TICK", 1.5e-9)
+        yield Branching(Family(operation.at("speed", 500.0), "speed", ends), 3.0)
 
 
 @pytest.mark.parametrize(
