@@ -9,6 +9,8 @@ from rubhpc.kernels._jit import jit_apart_sum, jit_inline_sum, short_loops
 
 Floats = NDArray[np.float64]
 
+MANTISSA, BIAS = 52, 1023  # bits, and offset of the exponent of a double
+
 
 @jit_inline_sum
 def lowest_level(count: int) -> int:
@@ -18,13 +20,8 @@ def lowest_level(count: int) -> int:
 
 @jit_inline_sum
 def leading_level(count: int) -> int:
-    """Level of the longest of them: six steps for any count, where `floor_log2` takes one a level."""
-    level, rest = 0, count
-    for halving in range(6):
-        shift = 32 >> halving
-        if rest >> shift > 0:
-            level, rest = level + shift, rest >> shift
-    return level
+    """Level of the longest of them, from 1 to 2^53: the exponent of the count as a float."""
+    return int((np.float64(count).view(np.int64) >> MANTISSA) - BIAS)
 
 
 @jit_apart_sum

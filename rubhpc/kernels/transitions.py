@@ -107,36 +107,30 @@ def pass_over(transitions: Transitions, place: int, m: int, z: Floats, after: Fl
     for k in range(2 * m):
         following[k] = 0.0
     for k in range(n_kept):
-        following[number[place + k]] = before[number[place + n_kept + k]]
+        following[np.uint64(number[place + k])] = before[np.uint64(number[place + n_kept + k])]
     place += 2 * n_kept
     for _ in range(n_block):
         n_source, n_target, at = number[place], number[place + 1], number[place + 2]
         place += 3
         width = (n_target + LANES - 1) // LANES * LANES
-        places, rows = number[place : place + n_source + n_target], transitions.value[at:]
-        pass_block(rows, n_source, width, places, before, source, target, following)
-        place += n_source + n_target
+        # Gathered and scattered here, one at a time, by numbers without a sign: vectors of them are slow.
+        for k in range(n_source):
+            source[k] = before[np.uint64(number[place + k])]
+        pass_block(transitions.value[at:], n_source, width, source, target)
+        place += n_source
+        for k in range(n_target):
+            following[np.uint64(number[place + k])] = target[k]
+        place += n_target
 
 
 @jit_apart_sum
 @short_loops
-def pass_block(
-    rows: Floats,
-    n_row: int,
-    width: int,
-    places: Ints,
-    before: Floats,
-    value: Floats,
-    total: Floats,
-    after: Floats,
-) -> None:
-    """Pass a block over: rows (n_row width,) times coordinates `before` (2 m,), eight rows at a time.
+def pass_block(rows: Floats, n_row: int, width: int, value: Floats, total: Floats) -> None:
+    """Fill `total` (width,) with rows (n_row width,) times coordinates `value` (n_row,), eight at a time.
 
-    `places` are those of its sources, then of its targets. Sources that have decayed are left out.
+    Those that have decayed are left out.
     """
     whole, last = n_row - n_row % 8, total[:width]
-    for k in range(n_row):
-        value[k] = before[places[k]]
     for k in range(width):
         last[k] = 0.0
     for row in range(0, whole, 8):
@@ -157,5 +151,3 @@ def pass_block(
         first, a = rows[row * width : (row + 1) * width], value[row]
         for k in range(width):
             last[k] += first[k] * a
-    for k in range(places.size - n_row):
-        after[places[n_row + k]] = last[k]
