@@ -108,8 +108,16 @@ class ModalSetup:
         )
 
     def bodies(self, friction: float, clearance: Floats) -> Reduced:
-        """The reduced bodies of a case for kernels; clearance (q,), m."""
-        return kernel_bodies(self.reduced, self.model, friction, clearance, self.law, self.displacement_limit)
+        """The reduced bodies of a case for kernels; clearance (q,), m. Cases of a friction share the rest."""
+        if friction not in self._bodies:
+            given = self.law, self.displacement_limit
+            self._bodies[friction] = kernel_bodies(self.reduced, self.model, friction, clearance, *given)
+        return self._bodies[friction]._replace(clearance=clearance)
+
+    @cached_property
+    def _bodies(self) -> dict[float, Reduced]:
+        """Bodies by friction."""
+        return {}
 
     @cached_property
     def interval(self) -> float:
@@ -255,6 +263,7 @@ class ModalSetup:
     def forget(self, friction: float) -> None:
         """Free the contact modes of a friction."""
         self._open_tables.pop(friction, None)
+        self._bodies.pop(friction, None)
         for held in self._all_libraries:
             held.pop(friction, None)
         if not any(self._all_libraries):  # and the shared parts, except those with every pair open

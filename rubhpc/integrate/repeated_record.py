@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.marches.event_driven import EventDrivenMarch
     from rubhpc.integrate.measuring.regimes import Verdict
     from rubhpc.integrate.modal_setup import ModalSetup
+    from rubhpc.integrate.periodic_motions.known_motions import Approach
     from rubhpc.integrate.periodic_motions.shooting import Orbit
     from rubhpc.kernels.accumulators import Accumulator
 
@@ -33,9 +34,9 @@ class KnownMotion(NamedTuple):
     multiplier: complex  # the largest
 
     @classmethod
-    def of(cls, orbit: Orbit) -> KnownMotion:
+    def of(cls, orbit: Orbit, approach: Approach) -> KnownMotion:
         """That of a solution."""
-        return cls(orbit.period, complex(orbit.multipliers[0]))
+        return cls(orbit.period, approach.multiplier)
 
     def judge(
         self, _vertical: Floats, _horizontal: Floats, _per_revolution: int, is_contact: bool
@@ -76,7 +77,7 @@ def _repeated(march: EventDrivenMarch, setup: ModalSetup, period: int, n_revolut
         follows.sense[:] = first.accumulator.sense
         last = march_record(march, setup, period - n_over, follows)
         marched.append((last, n_whole))
-    if last.reason is not None or (n_whole > 0 and not _closes(setup, begun, march.motion())):
+    if last.reason is not None or (n_whole > 0 and not _closes(setup, begun, march.stands_at())):
         return None
     parts = [Part(one.samples, one.accumulator, times) for one, times in marched]
     if n_revolution > period:
@@ -93,8 +94,9 @@ def _repeated(march: EventDrivenMarch, setup: ModalSetup, period: int, n_revolut
 
 def _closes(setup: ModalSetup, begun: Floats, ended: Floats) -> bool:
     """Whether a motion (2 n,) has returned, as nearly as events are resolved."""
-    energy = np.repeat([setup.spin**2, 1.0], begun.size // 2)
-    return bool((ended - begun) ** 2 @ energy <= nothing(setup) ** 2 * (begun**2 @ energy))
+    scale = np.array([[setup.spin], [1.0]])
+    apart, size = ((scale * motion.reshape(2, -1)).ravel() for motion in (ended - begun, begun))
+    return bool(apart @ apart <= nothing(setup) ** 2 * (size @ size))
 
 
 def _note_peak_at_return(

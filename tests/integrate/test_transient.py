@@ -231,6 +231,7 @@ STILL = SimpleNamespace(
     n=1,
     setup=SimpleNamespace(spin=1.0, tick=1e-9),
     size=np.linalg.norm,
+    energy=np.ones(2),
     bodies=SimpleNamespace(stiffness=np.eye(1)),
 )
 

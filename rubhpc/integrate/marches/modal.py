@@ -83,8 +83,11 @@ class ModalMarch(March):
 
     def reached(self) -> Place:
         """Present motion, for another speed to continue from."""
-        motion = self._ended if self._ended is not None else self.motion()
-        return Place(motion, self._setup.model.sag, self._contact_force())
+        return Place(self.stands_at(), self._setup.model.sag, self._contact_force())
+
+    def stands_at(self) -> Floats:
+        """The same as `motion`, found once at the end of a call."""
+        return self.motion() if self._ended is None else self._ended
 
     def _take(self, setup: ModalSetup) -> None:
         """Count time from 0, at the speed of a set-up."""
@@ -115,7 +118,7 @@ class ModalMarch(March):
 
     def energy(self) -> float:
         """Mechanical energy, J."""
-        return self._energy_of(self.motion())
+        return self._energy_of(self.stands_at())
 
     def _energy_of(self, motion: Floats) -> float:
         """Mechanical energy, J, of a reduced motion (2 n,)."""
@@ -125,7 +128,7 @@ class ModalMarch(March):
 
     def final(self) -> State:
         """State at the sample reached, in the reduced coordinates."""
-        return self.state_of(self.motion(), self._contact_force())
+        return self.state_of(self.stands_at(), self._contact_force())
 
     def state_of(self, motion: Floats, contact_force: Floats) -> State:
         """State of a reduced motion (2 n,) and of the forces (q,), N, at a whole revolution."""

@@ -97,12 +97,12 @@ def pass_directly(
                 force = piecewise.contact_force(orbit.states, orbit.motion)
                 walk.begin_at(piecewise.setup, Place(orbit.motion, piecewise.setup.model.sag, force))
             if is_near or reason is not None:
-                return walk.ended(reason, found=(piecewise, orbit) if is_near else None)
+                return walk.ended(reason, found=(piecewise, orbit, candidate.approach) if is_near else None)
             candidate.n_missed += 1
 
 
 class Candidate:
-    """A stable periodic motion that a case may draw near to, and the linear theory about it.
+    """A periodic motion that a case may draw near to if it is stable, and the linear theory about it.
 
     Attributes
     ----------
@@ -122,6 +122,11 @@ class Candidate:
         before, apart = passed[-1 - self.period] - self.orbit.motion, passed[-1] - self.orbit.motion
         left = self.piecewise.size(apart - self.orbit.monodromy @ before)
         return left / max(self.piecewise.size(before), np.finfo(float).tiny)
+
+    @property
+    def is_doubled(self) -> bool:
+        """Whether it is unstable, and the largest disturbance changes sides in every period."""
+        return not self.approach.is_stable and self.orbit.multipliers[0].real < -1.0
 
     @cached_property
     def approach(self) -> Approach:
@@ -143,10 +148,10 @@ def _candidates(piecewise: PiecewiseMotion, walk: Walk, missed: list[Candidate])
     again = (one for one in missed if one.n_missed == 1 and one.strays(walk.passed) <= STRAYS)
     yield from islice(again, 1)
     walk.stand()
-    orbit = _search(piecewise, walk.states, walk.passed, walk.n_revolution, {one.period for one in missed})
-    if orbit is not None:
-        missed.append(Candidate(piecewise, orbit))
-        yield missed[-1]
+    found = _search(piecewise, walk.states, walk.passed, walk.n_revolution, {one.period for one in missed})
+    if found is not None:
+        missed.append(found)
+        yield found
 
 
 def _piecewise(
@@ -184,9 +189,9 @@ def draws_near(walk: Walk, candidate: Candidate, until: int) -> tuple[bool, str 
     untried = math.inf  # square of the distance at which contacts are looked at next
     seen = walk.passed[::-1][::span][::-1] - orbit.motion  # its distances from one look to the next
     while True:
-        square = approach.squares(seen)
         foreseen = seen[:-1] @ onward.T
-        strays, expected = approach.squares(seen[1:] - foreseen), approach.squares(foreseen)
+        square, k = approach.squares(np.concatenate([seen, seen[1:] - foreseen, foreseen])), len(seen)
+        strays, expected, square = square[k : 2 * k - 1], square[2 * k - 1 :], square[:k]
         for was, last, stray, less in zip(square[:-1], square[1:], strays, expected, strict=True):
             if stray > LINEAR**2 * was or last >= was:
                 looks = []
@@ -219,47 +224,47 @@ def _fall(before: float, after: float) -> float:
 
 def _agree(looks: list[tuple[float, float, float]], least: int) -> bool:
     """Whether so many of the latest looks, or more, show what the linear theory says."""
-    if len(looks) < least:
-        return False
-    strayed, expected, lost = np.cumsum(looks[::-1], axis=0)[least - 1 :].T
-    return bool(np.any((strayed <= (SHARE * expected) ** 2) & (lost >= LOST * expected)))
+    strayed = expected = lost = 0.0
+    for n_look, (stray, to_lose, loses) in enumerate(reversed(looks), 1):
+        strayed, expected, lost = strayed + stray, expected + to_lose, lost + loses
+        if n_look >= least and strayed <= (SHARE * expected) ** 2 and lost >= LOST * expected:
+            return True
+    return False
 
 
 def _search(
     piecewise: PiecewiseMotion, states: int, passed: Floats, n_revolution: int, missed: Collection[int]
-) -> Orbit | None:
+) -> Candidate | None:
     """Return the stable periodic motion that the last ones lead to: of one revolution, or as they return.
 
     The first that they follow to, else of two the nearer one. An unstable motion whose disturbances change
     sides in every period is followed to twice its period. Periods that were `missed` before come last.
     """
-    found: list[tuple[float, Orbit]] = []
+    found: list[tuple[float, Candidate]] = []
     for period in sorted(_periods(piecewise, passed, n_revolution), key=missed.__contains__):
-        orbit = _solved(piecewise, states, passed, asked := period)
-        while orbit and orbit.multipliers[0].real < -1.0 and (asked := 2 * asked) <= LONGEST_PERIOD:
-            orbit = _solved(piecewise, states, passed, asked)
-        if orbit and abs(orbit.multipliers[0]) < 1.0:
-            if Candidate(piecewise, orbit).strays(passed) <= LINEAR:
-                return orbit
-            found.append((piecewise.size(orbit.motion - passed[-1]), orbit))
+        one = _solved(piecewise, states, passed, asked := period)
+        while one and one.is_doubled and (asked := 2 * asked) <= LONGEST_PERIOD:
+            one = _solved(piecewise, states, passed, asked)
+        if one and one.approach.is_stable:
+            if one.strays(passed) <= LINEAR:
+                return one
+            found.append((piecewise.size(one.orbit.motion - passed[-1]), one))
     return min(found, key=lambda one: one[0])[1] if found else None
 
 
 def _periods(piecewise: PiecewiseMotion, passed: Floats, n_revolution: int) -> list[int]:
     """1, and the least number of revolutions after which the motion comes back far nearer than after one."""
     longest = min(len(passed) - 1, n_revolution // PATIENCE, LONGEST_PERIOD)
-    energy = np.repeat([piecewise.setup.spin**2, 1.0], piecewise.n)
-    back = (passed[-1] - passed[::-1][1 : longest + 1]) ** 2 @ energy
+    back = (passed[-1] - passed[::-1][1 : longest + 1]) ** 2 @ piecewise.energy
     return [1, *(np.flatnonzero(back[1:] <= NEARER**2 * back[:1]) + 2)[:1].tolist()]
 
 
-def _solved(piecewise: PiecewiseMotion, states: int, passed: Floats, period: int) -> Orbit | None:
+def _solved(piecewise: PiecewiseMotion, states: int, passed: Floats, period: int) -> Candidate | None:
     """Periodic motion that the last ones lead to, a period apart; None where none is found."""
-    energy = np.repeat([piecewise.setup.spin**2, 1.0], piecewise.n)
     try:
-        return shoot(
+        orbit = shoot(
             piecewise,
-            extrapolated(passed[::-1][::period][: LEADING + 1][::-1], energy),
+            extrapolated(passed[::-1][::period][: LEADING + 1][::-1], piecewise.energy),
             states,
             period,
             most_iterations=MOST_ITERATIONS,
@@ -270,3 +275,4 @@ def _solved(piecewise: PiecewiseMotion, states: int, passed: Floats, period: int
         )
     except (NoClosedForm, NotConverged):
         return None
+    return Candidate(piecewise, orbit)

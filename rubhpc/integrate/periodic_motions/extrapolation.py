@@ -5,13 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg.lapack import dgelsy
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
 
-LEAST_SHARE = 1e-6  # of the largest singular value: smaller ones are rounding or nonlinear
+LEAST_SHARE = 1e-6  # of the largest singular value: smaller ones, as estimated, are rounding or nonlinear
 
 
 def extrapolated(motions: Floats, energy: Floats) -> Floats:
@@ -28,8 +29,11 @@ def extrapolated(motions: Floats, energy: Floats) -> Floats:
     """
     if len(motions) < 3:
         return np.asarray(motions[-1])
-    change = np.diff(motions, axis=0)
-    turned = (change[:-1] - change[-1]).T
+    change = motions[1:] - motions[:-1]
     root = np.sqrt(energy)
-    weights = np.linalg.lstsq(turned * root[:, None], -change[-1] * root, rcond=LEAST_SHARE)[0]
+    turned = ((change[:-1] - change[-1]) * root).T
+    (m, k), last = turned.shape, np.zeros((max(turned.shape), 1))
+    last[:m, 0] = -change[-1] * root
+    free = np.zeros(k, dtype=np.int32)  # columns that may be exchanged: all
+    weights = dgelsy(turned, last, free, LEAST_SHARE, m * k)[1][:k, 0]
     return np.asarray(motions[-1] + (motions[1:-1] - motions[-1]).T @ weights)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -28,6 +29,7 @@ LINEAR = 0.1  # of its distance, by which it may differ from that then
 HALF = 1 / 4  # of the square of its distance, that is left when it has drawn near
 THERE = 1e-8  # of the motion's size: a case as near as that has arrived
 TICKS = 4  # times what a point of the orbit turns in the resolution of events: nearer no simulation comes
+NEUTRAL = 1e12  # times the energy of the first period, in all periods: what does not decay
 SAME = 1e-7  # of the motion's size: motions as near as that are one
 
 
@@ -47,11 +49,12 @@ class Approach:
     monodromy : (2 n, 2 n)
     theory : Theory
         The same, as far as anything is left of a disturbance after one period.
+    is_stable : bool
+        Whether the sum exists: all multipliers lie within the unit circle.
 
     Parameters
     ----------
     monodromy : (2 n, 2 n)
-        Its eigenvalues lie within the unit circle.
     energy : (2 n,)
         Diagonal of W.
     scale : (2 n,), optional
@@ -69,8 +72,9 @@ class Approach:
             rooms[2, :rank, :rank].copy(),
             rooms[3, :rank, :rank].copy(),
         )
-        self._form = self.theory.reading.T @ (self.theory.sums @ self.theory.reading)
-        self._form[np.diag_indices(m)] += energy
+        first = float((self.theory.span**2 @ energy).sum())
+        self.is_stable = bool(rank == 0 or self.theory.sums.trace() < NEUTRAL * first)
+        self._energy = energy
 
     @classmethod
     def to(cls, piecewise: PiecewiseMotion, monodromy: Floats) -> Approach:
@@ -78,7 +82,20 @@ class Approach:
         square, pace = piecewise.setup.spin**2, piecewise.bodies.stiffness.diagonal()
         scale = np.ones(2 * piecewise.n)
         np.sqrt(np.maximum(pace, square), out=scale[: piecewise.n])
-        return cls(monodromy, np.repeat([square, 1.0], piecewise.n), scale)
+        return cls(monodromy, piecewise.energy, scale)
+
+    @cached_property
+    def _form(self) -> Floats:
+        """P, (2 n, 2 n)."""
+        form: Floats = self.theory.reading.T @ (self.theory.sums @ self.theory.reading)
+        form.flat[:: len(form) + 1] += self._energy
+        return form
+
+    @cached_property
+    def multiplier(self) -> complex:
+        """The largest; of a pair either."""
+        found = np.linalg.eigvals(self.theory.onward)
+        return complex(found[np.abs(found).argmax()]) if found.size else 0j
 
     def square(self, apart: Floats) -> float:
         """Square of the distance (2 n,)."""
@@ -154,14 +171,15 @@ class KnownMotions:
         """Revolutions of all motions."""
         return len(self._places)
 
-    def add(self, piecewise: PiecewiseMotion, orbit: Orbit) -> None:
-        """Keep a stable motion."""
+    def add(self, piecewise: PiecewiseMotion, orbit: Orbit, approach: Approach) -> None:
+        """Keep a stable motion, with what is known of cases near it."""
         turns, motion, states = orbit.revolutions, orbit.motion, orbit.states
+        multiplier = approach.multiplier
         for k, turn in enumerate(turns):
-            matrix = monodromy(piecewise, (*turns[k:], *turns[:k])) if k else orbit.monodromy
+            if k:
+                approach = Approach.to(piecewise, monodromy(piecewise, (*turns[k:], *turns[:k])))
             state = piecewise.march.state_of(motion, piecewise.contact_force(states, motion))
-            approach = Approach.to(piecewise, matrix)
-            size, multiplier = piecewise.size(motion), complex(orbit.multipliers[0])
+            size = piecewise.size(motion)
             self._places.append(Place(motion, state, orbit.period, size, multiplier, approach))
             motion, states = turn.end, turn.states
         self._sections = np.array([place.motion for place in self._places])

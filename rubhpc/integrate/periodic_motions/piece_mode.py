@@ -29,6 +29,8 @@ class Mode(NamedTuple):
         In the tables of the march.
     is_closed, is_open : (q,)
         Pairs that are closed, and those that are watched for their gap.
+    gaps : int
+        Bits of the switch functions that are gaps.
     tables : PieceTables
         What a piece is followed with.
     moving : (c,)
@@ -45,6 +47,7 @@ class Mode(NamedTuple):
     place: int
     is_closed: NDArray[np.bool_]
     is_open: NDArray[np.bool_]
+    gaps: int
     tables: PieceTables
     moving: NDArray[np.int64]
     exponent: Complexes
@@ -101,10 +104,10 @@ def unknown_modes(tables: ModeTables) -> PieceModes:
     )
 
 
-def know(modes: PieceModes, mode: Mode, gaps: int) -> None:
-    """Fill in the row of a mode; `gaps` are the bits of its switch functions that are gaps."""
+def know(modes: PieceModes, mode: Mode) -> None:
+    """Fill in the row of a mode."""
     place, tables = mode.place, mode.tables
-    modes.gaps[place], modes.n_moving[place] = gaps, mode.moving[-1] + 1
+    modes.gaps[place], modes.n_moving[place] = mode.gaps, mode.moving[-1] + 1
     modes.exponent[place], modes.drift[place] = tables.exponent, tables.drift
     modes.floor[place], modes.kind[place] = tables.floor, tables.kind
     modes.offset[place] = tables.offset
@@ -157,6 +160,7 @@ def _read_mode(march: EventDrivenMarch, states: int) -> Mode:
         place=place,
         is_closed=is_closed,
         is_open=is_open,
+        gaps=march.gaps_watched(states),
         tables=followed,
         moving=moving,
         exponent=exponent[0, moving] + 1j * exponent[1, moving],

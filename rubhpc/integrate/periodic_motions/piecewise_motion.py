@@ -68,6 +68,8 @@ class PiecewiseMotion:
         Where the case begins: its reduced motion, and the states of its pairs.
     turn : float, s
         Duration of a revolution.
+    energy : (2 n,)
+        Twice the energy of unit motions, with the spin as their pace.
     highest, longest : int
         Level of the longest tabulated steps, and of those between which no turn of a gap is missed.
 
@@ -100,6 +102,8 @@ class PiecewiseMotion:
         self.turn = setup.interval * setup.samples_per_revolution
         self.bodies = self.march.bodies
         self.n, self.q = self.bodies.stiffness.shape[0], len(setup.model.stators)
+        self.energy = np.ones(2 * self.n)
+        self.energy[: self.n] = setup.spin**2
         self.n_switch = self.march.tables.switch_re.shape[1]
         self._modes: dict[int, Mode] = {}
         self._change_rooms: dict[tuple[int, int], ChangeRoom] = {}
@@ -135,7 +139,7 @@ class PiecewiseMotion:
             if self.march.tables is not self._tables:
                 self._take_tables()
             self._modes[states] = mode = mode_of(self.march, states)
-            know(self.known, mode, self.march.gaps_watched(states))
+            know(self.known, mode)
         return self._modes[states]
 
     def enter(self, mode: Mode, time: float, motion: Floats) -> Floats:

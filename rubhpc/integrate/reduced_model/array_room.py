@@ -37,5 +37,5 @@ def aligned(shape: tuple[int, ...], dtype: np.dtype[Any] = _FLOATS) -> NDArray[A
     """
     n_byte = math.prod(shape) * dtype.itemsize
     room = np.zeros(n_byte + _LINE, dtype=np.uint8)
-    first = -room.ctypes.data % _LINE
+    first = -room.__array_interface__["data"][0] % _LINE
     return np.ndarray(shape, dtype, buffer=room, offset=first)

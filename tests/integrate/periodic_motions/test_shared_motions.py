@@ -98,3 +98,18 @@ def test_near_means_that_the_linear_theory_holds():
     assert approach.obeys(near, after(near, 2), 2)
     assert not approach.obeys(far, after(far, 1), 1)
     assert not approach.obeys(near, near, 1)  # it stays away
+
+
+@pytest.mark.parametrize("size", [1e-3, 0.9, 1.0 - 1e-6, 1.0, 1.0 + 1e-6, 1.2])
+@pytest.mark.parametrize("angle", [0.0, 0.7, math.pi])
+def test_stable_are_multipliers_within_the_unit_circle(size, angle):
+    """Of a matrix of rank three, whose other multiplier lies well within."""
+    turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+    matrix = np.zeros((5, 5))
+    matrix[:2, :2], matrix[2, 2] = size * turn, 0.3 * size
+    random = np.random.default_rng(1).standard_normal((5, 5))
+    approach = Approach(random @ matrix @ np.linalg.inv(random), np.ones(5))
+    assert approach.is_stable == (size < 1.0)
+    if approach.is_stable:
+        found = approach.multiplier
+        assert abs(found.real + 1j * abs(found.imag) - size * np.exp(1j * angle)) < 1e-7 * size
