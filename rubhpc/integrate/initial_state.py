@@ -18,8 +18,9 @@ from rubhpc.fem.model import state_size
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.packing import degrees_of
 from rubhpc.integrate.record import State
-from rubhpc.kernels.complementarity import solve_complementarity
+from rubhpc.kernels.complementarity import UNSOLVED
 from rubhpc.kernels.contact_pairs import AXIAL, normal_and_gap
+from rubhpc.kernels.lemke import solve_lemke
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -47,7 +48,7 @@ def fit_to_gaps(state: State, setup: Setup, clearance: float) -> State:
     Raises
     ------
     InputError
-        The state is of a rig with other degrees of freedom.
+        The state is of a rig with other degrees of freedom, or the stators leave no room for the shaft.
     """
     if state.packed().size != state_size(setup.model):
         raise InputError(
@@ -143,8 +144,13 @@ def static_shapes(force: Floats, setup: Setup) -> Floats:
 
 
 def _least_forces(compliance: Floats, gap: Floats) -> Floats:
-    """Compressive forces (q,), N, that leave no gap below zero."""
+    """Compressive forces (q,), N, that leave no gap below zero; some, where walls share them."""
     q = gap.size
-    force, active, work = np.zeros(q), gap < 0.0, np.zeros((q, q + 1))
-    solve_complementarity(np.ascontiguousarray(compliance), gap, TOLERANCE, force, active, work)
-    return force
+    scale = np.abs(compliance).max()
+    tableau = np.hstack([np.eye(q), -compliance / scale, -np.ones((q, 1)), gap[:, None]])
+    basis = np.arange(q)
+    if solve_lemke(tableau, basis, q) == UNSOLVED:
+        raise InputError("initial: the stators leave no room for the shaft; take a larger clearance")
+    force = np.zeros(2 * q + 1)
+    force[basis] = np.maximum(tableau[:, -1], 0.0) / scale
+    return force[q : 2 * q]

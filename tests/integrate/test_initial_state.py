@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from trial_rig import trial_rig
 
-from rubhpc import simulate
+from rubhpc import LumpedStator, read_rig, simulate
 from rubhpc.errors import InputError
 from rubhpc.integrate.case import run_case
-from rubhpc.integrate.initial_state import fit_to_gaps, gaps
+from rubhpc.integrate.initial_state import _least_forces, at_rest, fit_to_gaps, gaps
+from rubhpc.integrate.record import State
 from rubhpc.integrate.setup import prepare
 from rubhpc.study.study import Contact, Integrator, Recording
-
-if TYPE_CHECKING:
-    from rubhpc.integrate.record import State
 
 SPIN = 220.0  # rad/s
 SHORT = Recording(transient=0, revolutions=2, samples_per_revolution=64)
@@ -140,3 +138,35 @@ def test_a_rig_of_other_degrees_is_refused_in_a_line():
             revolutions=1,
             initial=record.final,
         )
+
+
+@pytest.mark.parametrize("friction_law", ["sliding", "coulomb"])
+def test_a_shaft_rests_on_the_walls_that_its_sag_overlaps(friction_law):
+    """In a ring of eight, of which it overlaps four: two of them carry it."""
+    walls = tuple(LumpedStator(node=8, angle=0.55 + i * math.pi / 4.0, rigid=True) for i in range(8))
+    packaged = read_rig("mokhtar2017")
+    rig = replace(packaged, rotor=replace(packaged.rotor, gravity=9.81), stator=walls)
+    setup = prepare(
+        rig,
+        SPIN,
+        contact=Contact(friction_law=friction_law),
+        integrator=Integrator(),
+        samples_per_revolution=SHORT.samples_per_revolution,
+    )
+    clearance = 5e-6
+    over, _ = gaps(State.at_rest(setup.model).displacement, setup, clearance)
+    state = at_rest(setup, clearance)
+    left, _ = gaps(state.displacement, setup, clearance)
+    carries = state.contact_force > 1.0
+    assert np.count_nonzero(over < 0.0) == 4
+    assert left.min() > -1e-15
+    assert np.count_nonzero(carries) == 2
+    assert abs(left[carries]).max() < 1e-15
+    record = run_case(setup, clearance=clearance, friction=0.1, recording=SHORT)
+    assert record.reason == ""
+    assert record.energy_residual < 1e-5
+
+
+def test_walls_that_leave_no_room_are_named():
+    with pytest.raises(InputError, match="leave no room"):
+        _least_forces(np.array([[1.0, -1.0], [-1.0, 1.0]]), np.array([-1e-5, -1e-5]))

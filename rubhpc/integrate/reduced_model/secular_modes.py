@@ -154,7 +154,8 @@ class _Poles(NamedTuple):
     def zeros(self) -> _Zeros | None:
         """All zeros by Newton's method; None where it does not converge to as many."""
         n_pole = self.upper.size
-        first = -self.residue[:n_pole] / (self.constant + (1.0 / self.apart) @ self.residue)
+        with np.errstate(divide="ignore", invalid="ignore"):  # not finite: strong
+            first = -self.residue[:n_pole] / (self.constant + (1.0 / self.apart) @ self.residue)
         weak = np.abs(first) <= WEAK * self.nearest
         strong = np.flatnonzero(~weak)
         started = self._start(strong)
