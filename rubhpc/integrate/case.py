@@ -164,7 +164,7 @@ def _integrate(
         if record is not None:
             return record
         march, reason, n_transient, n_step = passed.march, passed.reason, passed.n_revolution, passed.n_step
-        motion = None if passed.found is None else KnownMotion.of(*passed.found[1:])
+        motion = None if passed.found is None else KnownMotion.of(passed.found)
     else:
         reason, n_transient = pass_transient(march, recording)
     marched: Marched | None = None

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-TOLERANCE = 1e-12  # m, ten times the tolerance of the integrators: a continued run is not changed
+TOLERANCE = 1e-12  # m, a hundred times the tolerance of the integrators: a continued run is not changed
 PARTED = 1e-9  # m, beyond which a closed contact has opened
 LEAST_FORCE = np.finfo(float).tiny  # N, least force that marks a contact as closed
 MOST_PASSES = 20  # for the curved gap of the updated normal; three or four are usual

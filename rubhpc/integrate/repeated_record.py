@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.marches.event_driven import EventDrivenMarch
     from rubhpc.integrate.measuring.regimes import Verdict
     from rubhpc.integrate.modal_setup import ModalSetup
-    from rubhpc.integrate.periodic_motions.known_motions import Approach
-    from rubhpc.integrate.periodic_motions.shooting import Orbit
+    from rubhpc.integrate.periodic_motions.known_motions import Found
     from rubhpc.kernels.accumulators import Accumulator
 
     Floats = NDArray[np.float64]
@@ -34,9 +33,9 @@ class KnownMotion(NamedTuple):
     multiplier: complex  # the largest
 
     @classmethod
-    def of(cls, orbit: Orbit, approach: Approach) -> KnownMotion:
+    def of(cls, found: Found) -> KnownMotion:
         """That of a solution."""
-        return cls(orbit.period, approach.multiplier)
+        return cls(found.orbit.period, found.approach.multiplier)
 
     def judge(
         self, _vertical: Floats, _horizontal: Floats, _per_revolution: int, is_contact: bool

@@ -10,7 +10,7 @@ from rubhpc.fem.assemble import assemble, model_at
 from rubhpc.fem.free_spin import release
 from rubhpc.fem.probes import with_probes
 from rubhpc.integrate.central_difference_setup import CentralDifferenceSetup, prepare_steps
-from rubhpc.integrate.modal_setup import LONGEST_TURN, ModalSetup
+from rubhpc.integrate.modal_setup import FINEST_TICK, LONGEST_TURN, ModalSetup
 from rubhpc.integrate.packing import law_of
 from rubhpc.integrate.reduced_model.reduction import reduce_model
 from rubhpc.integrate.reduced_model.truncation import touch_of
@@ -69,8 +69,8 @@ def prepare(
         if 2.0 * math.pi / abs(speed) > LONGEST_TURN:
             least = 2.0 * math.pi / LONGEST_TURN
             raise InputError(
-                f"speed: {speed:.3g} rad/s is too slow for events timed to 0.19 ns; take {least:.1g} rad/s "
-                "or more"
+                f"speed: {speed:.3g} rad/s is too slow for events timed to {1e9 * FINEST_TICK:.2g} ns; take "
+                f"{least:.1g} rad/s or more"
             )
         law, is_updated = law_of(contact), contact.normal == "updated"
         touch = touch_of(model, law, is_updated=is_updated)

@@ -201,15 +201,6 @@ def find_mode(mask: Ints, wanted: int) -> int:
 
 
 @jit_inline_sum
-def floor_log2(count: int) -> int:
-    """Largest level with 2^level <= count; count at least 1."""
-    level = 0
-    while count >> (level + 1) > 0:
-        level += 1
-    return level
-
-
-@jit_inline_sum
 def positive_interval(s: float, rate: float, bound: float) -> float:
     """Time, s, in which a switch function stays positive: `s + s' t - b t^2 / 2 > 0`."""
     if not s > 0.0:

@@ -15,12 +15,12 @@ MANTISSA, BIAS = 52, 1023  # bits, and offset of the exponent of a double
 @jit_inline_sum
 def lowest_level(count: int) -> int:
     """Level of the shortest of the powers of two that make up a count of at least one."""
-    return leading_level(count & -count)
+    return floor_log2(count & -count)
 
 
 @jit_inline_sum
-def leading_level(count: int) -> int:
-    """Level of the longest of them, from 1 to 2^53: the exponent of the count as a float."""
+def floor_log2(count: int) -> int:
+    """Largest level with 2^level <= count, from 1 to 2^53: the exponent of the count as a float."""
     return int((np.float64(count).view(np.int64) >> MANTISSA) - BIAS)
 
 

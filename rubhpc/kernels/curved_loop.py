@@ -31,9 +31,9 @@ from rubhpc.kernels.contact_modes import (
     Reduced,
     enter,
     find_mode,
-    floor_log2,
     propagate,
 )
+from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.curved_contact import (
     ALONG,
     BEFORE,

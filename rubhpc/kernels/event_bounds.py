@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, short_loops
-from rubhpc.kernels.coordinate_steps import leading_level
+from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.earlier_spans import (
     ASKED,
     COMPARED,
@@ -171,7 +171,7 @@ def ticks_beyond(value: float, rate: float, bend: float, tick: float, most: int)
     if not time < most * tick:
         return most
     count = int(time / tick)
-    unit = 1 << max(leading_level(max(count, 1)) - FEW_BITS, 0)
+    unit = 1 << max(floor_log2(max(count, 1)) - FEW_BITS, 0)
     passed = (count // unit + 1) * unit
     return int(passed + unit if passed - count < unit // CLOSE else passed)
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, short_loops
 from rubhpc.kernels.contact_modes import ModeTables, dot
-from rubhpc.kernels.coordinate_steps import go_on, leading_level
+from rubhpc.kernels.coordinate_steps import floor_log2, go_on
 from rubhpc.kernels.event_bounds import FREE
 from rubhpc.kernels.friction_coordinates import used_width
 from rubhpc.kernels.friction_states import OPEN, STUCK, FrictionBodies, state_of, stuck_pairs
@@ -246,7 +246,7 @@ def approach_change(
         if tried <= NEWTON_TRIES and 1.0 * before <= root < 1.0 * after:
             place = min(max(int(root), before + 1), after - 1)
             if tried == 1:  # no more digits than are known
-                place = max(place - place % (1 << leading_level(max(1, place >> KNOWN_BITS))), 1)
+                place = max(place - place % (1 << floor_log2(max(1, place >> KNOWN_BITS))), 1)
         move_ticks(tables, bodies, mode, place - before, clock.tick, z, work)
         found, soon, is_clear, root = look_ahead(
             tables, mode, crossing, overlap, clock.tick, now + place, known, work_re, work_im

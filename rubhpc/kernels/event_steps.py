@@ -18,9 +18,9 @@ from rubhpc.kernels.contact_modes import (
     dot,
     enter,
     find_mode,
-    floor_log2,
     is_beyond,
 )
+from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.measuring import end_span
 from rubhpc.kernels.sampling import Recorder, take_samples
 

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum, jit_part_sum
 from rubhpc.kernels.case_progress import NONE
-from rubhpc.kernels.contact_modes import FORCED_LEVEL, bounded, dot, floor_log2, propagate
+from rubhpc.kernels.contact_modes import FORCED_LEVEL, bounded, dot, propagate
+from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.cubics import turning_value
 
 Floats = NDArray[np.float64]

@@ -25,7 +25,7 @@ from rubhpc.kernels.case_progress import (
     Progress,
 )
 from rubhpc.kernels.contact_modes import FORCED_LEVEL, ModeTables, Reduced
-from rubhpc.kernels.coordinate_steps import go_on, leading_level, turn_on
+from rubhpc.kernels.coordinate_steps import floor_log2, go_on, turn_on
 from rubhpc.kernels.earlier_spans import begin_bounds, end_bounds, go_on_without
 from rubhpc.kernels.event_bounds import FEW_BITS, WORTH_ASKING, compared_until, free_until
 from rubhpc.kernels.event_forces import FrictionWork  # noqa: TC001 - part of a kernel's signature
@@ -85,7 +85,7 @@ def advance_with_friction(
     overlap = reduced.overlap
     highest_level = power_re.shape[1] - 1
     if is_recorded:  # spans have room for some samples
-        highest_level = min(highest_level, clock.sample_level + leading_level(LONGEST))
+        highest_level = min(highest_level, clock.sample_level + floor_log2(LONGEST))
     last_step = progress.n_step + MOST_STEPS
     progress.halving_level, progress.is_after_event = NONE, 0
     is_new = True  # the contact mode, to this call
@@ -153,7 +153,7 @@ def advance_with_friction(
             states = mask[mode]
             longest, left = highest_level, last_tick - progress.tick
             if left < 1 << highest_level:
-                longest = leading_level(left)
+                longest = floor_log2(left)
             if not is_at_event and progress.tick >= renewed_at and progress.tick + (1 << longest) > sure_to:
                 free_to, sure_to = free_until(
                     states,
@@ -182,7 +182,7 @@ def advance_with_friction(
             else:
                 reach = min(sure_to - progress.tick, left, 1 << highest_level)
                 count = max(leading(reach), 1 << min(longest, clock.search_level))
-                level = leading_level(count)
+                level = floor_log2(count)
             step, ends = count * clock.tick, progress.tick + count
             progress.n_step += 1
             is_checked = not is_forced and ends > free_to
@@ -278,5 +278,5 @@ def advance_with_friction(
 @jit_inline_sum
 def leading(count: int) -> int:
     """The count of ticks less all but its first bits; 0 of none."""
-    unit = 1 << max(leading_level(max(count, 1)) - FEW_BITS, 0)
+    unit = 1 << max(floor_log2(max(count, 1)) - FEW_BITS, 0)
     return int(max(count, 0) // unit * unit)

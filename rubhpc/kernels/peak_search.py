@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, jit_part_sum
 from rubhpc.kernels.accumulators import observe_force
-from rubhpc.kernels.contact_modes import DYING, FORCED_LEVEL, RESOLVED, ModeTables, dot, floor_log2
+from rubhpc.kernels.contact_modes import DYING, FORCED_LEVEL, RESOLVED, ModeTables, dot
+from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.event_search import longest_move, move_ticks
 from rubhpc.kernels.force_average import AVERAGING_TIME, BEGIN, COUNT, END, IMPULSE, OLDEST
 from rubhpc.kernels.friction_spans import copy_coordinates

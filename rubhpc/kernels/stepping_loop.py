@@ -28,8 +28,9 @@ from rubhpc.kernels.accumulators import (
 from rubhpc.kernels.case_progress import CONTACT_UNSOLVED, FINISHED, MOST_STEPS, PAUSED, Clock, Progress
 from rubhpc.kernels.complementarity import UNSOLVED
 from rubhpc.kernels.contact_forces import solve_contact
-from rubhpc.kernels.contact_modes import ModeTables, Reduced, dot, event_free_interval, floor_log2, propagate
+from rubhpc.kernels.contact_modes import ModeTables, Reduced, dot, event_free_interval, propagate
 from rubhpc.kernels.contact_pairs import N_DEGREE, Pairs, Workspace, fill_start, is_any_closed
+from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.laws import is_bouncing, is_penalty, is_plain
 from rubhpc.kernels.measuring import begin_span, end_span
 from rubhpc.kernels.sampling import Recorder, take_samples

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.complementarity import solve_active
-from rubhpc.kernels.contact_modes import ModeTables, Reduced, add_rows, dot, floor_log2
-from rubhpc.kernels.coordinate_steps import turn_on
+from rubhpc.kernels.contact_modes import ModeTables, Reduced, add_rows, dot
+from rubhpc.kernels.coordinate_steps import floor_log2, turn_on
 from rubhpc.kernels.mode_change import AT_REST, product
 from rubhpc.kernels.trail import Trail  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.transitions import UNKNOWN, Transitions, add_impulses, pass_over, see

@@ -194,7 +194,8 @@ def settling() -> None:
 
 def transients() -> None:
     """Transients to equal errors of the orbit: direct, auto, given (guide, performance: the direct way)."""
-    keep = {"samples_per_revolution": 64, "revolutions": 4, "keep": ("waveform",), "transient_limit": 40_000}
+    most = 40_000
+    keep = {"samples_per_revolution": 64, "revolutions": 4, "keep": ("waveform",), "transient_limit": most}
     rows = ((0.9, 0.523, 0.3), (1.3, 0.968, 0.269), (1.6, 0.74, 0.33), (3.0, 0.5, 0.2))
     for alpha, (ratio, clearance, friction) in product((0.4, 0.8, 1.6, 4.0), rows):
         case: dict[str, Any] = {
@@ -235,7 +236,7 @@ def transients() -> None:
         )
         for tolerance in (1e-9, 3e-9, 1e-8):  # as near as events are resolved
             settled = run(transient="auto", transient_tolerance=tolerance)
-            if settled.transient_revolutions < 40_000:
+            if settled.transient_revolutions < most:
                 break
         trials = [(error(settled), tolerance, settled)]
         for wanted in (1e-3, 1e-6):

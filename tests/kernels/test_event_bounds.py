@@ -8,7 +8,7 @@ from rubhpc.kernels._jit import plain
 from rubhpc.kernels.friction_states import FORWARD
 
 TICK = 1e-6  # s
-BOUNDS = ("positive_until", "is_positive", "least_until", "falling_until", "ticks_beyond", "leading_level")
+BOUNDS = ("positive_until", "is_positive", "least_until", "falling_until", "ticks_beyond", "floor_log2")
 BOUNDS += ("is_watched", "known_until", "note_interval")
 SPANS = ("is_watched", "learn", "weigh", "compare", "state_of")
 

@@ -22,8 +22,8 @@ NAMES = (
     "dot",
     "state_of",
 )
-NAMES += ("stuck_pairs", "used_width", "leading_level")
-STEPS = ("turn_on", "lowest_level", "leading_level")
+NAMES += ("stuck_pairs", "used_width", "floor_log2")
+STEPS = ("turn_on", "lowest_level", "floor_log2")
 
 
 @pytest.fixture(autouse=True)

@@ -13,7 +13,7 @@ from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.marches.modal import Place
 from rubhpc.integrate.measuring.orbit_measures import LONGEST_PERIOD
 from rubhpc.integrate.periodic_motions.extrapolation import extrapolated
-from rubhpc.integrate.periodic_motions.known_motions import LINEAR, SAME, SHARE, Approach, nothing
+from rubhpc.integrate.periodic_motions.known_motions import LINEAR, SAME, SHARE, Approach, Found, nothing
 from rubhpc.integrate.periodic_motions.onward import Onward
 from rubhpc.integrate.periodic_motions.shooting import NotConverged, Orbit, shoot
 from rubhpc.integrate.periodic_motions.walk import LEADING, LOOK, Passed, Walk
@@ -97,7 +97,8 @@ def pass_directly(
                 force = piecewise.contact_force(orbit.states, orbit.motion)
                 walk.begin_at(piecewise.setup, Place(orbit.motion, piecewise.setup.model.sag, force))
             if is_near or reason is not None:
-                return walk.ended(reason, found=(piecewise, orbit, candidate.approach) if is_near else None)
+                found = Found(piecewise, orbit, candidate.approach) if is_near else None
+                return walk.ended(reason, found=found)
             candidate.n_missed += 1
 
 

@@ -151,6 +151,14 @@ class Place(NamedTuple):
         return -(-WATCHED // self.period)
 
 
+class Found(NamedTuple):
+    """A stable motion that was solved for, and the linear theory of cases near it."""
+
+    piecewise: PiecewiseMotion
+    orbit: Orbit
+    approach: Approach
+
+
 class KnownMotions:
     """Motions as they are found; it keeps no set-up, so that it may be kept as long as that.
 
@@ -171,8 +179,9 @@ class KnownMotions:
         """Revolutions of all motions."""
         return len(self._places)
 
-    def add(self, piecewise: PiecewiseMotion, orbit: Orbit, approach: Approach) -> None:
-        """Keep a stable motion, with what is known of cases near it."""
+    def add(self, found: Found) -> None:
+        """Keep a motion, with the linear theory from each of its revolutions."""
+        piecewise, orbit, approach = found
         turns, motion, states = orbit.revolutions, orbit.motion, orbit.states
         multiplier = approach.multiplier
         for k, turn in enumerate(turns):

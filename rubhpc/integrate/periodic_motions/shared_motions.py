@@ -89,7 +89,7 @@ def _add(
         assert isinstance(march, EventDrivenMarch)
         passed = pass_directly(march, solve_from, recording, known)
         if passed.found is not None:
-            known.add(*passed.found)
+            known.add(passed.found)
     except NoClosedForm:
         return False
     return passed.found is not None or passed.reached is not None

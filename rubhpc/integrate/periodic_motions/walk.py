@@ -17,9 +17,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.marches.event_driven import EventDrivenMarch
     from rubhpc.integrate.marches.modal import Place
     from rubhpc.integrate.modal_setup import ModalSetup
-    from rubhpc.integrate.periodic_motions.known_motions import Approach, KnownMotions
-    from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
-    from rubhpc.integrate.periodic_motions.shooting import Orbit
+    from rubhpc.integrate.periodic_motions.known_motions import Found, KnownMotions
     from rubhpc.study.study import Recording
 
     Floats = NDArray[np.float64]
@@ -38,7 +36,7 @@ class Passed(NamedTuple):
     n_revolution: int  # simulated
     n_step: int  # steps of other marches
     reached: int | None = None  # number of the place of a known motion that the case has reached
-    found: tuple[PiecewiseMotion, Orbit, Approach] | None = None  # the motion solved for, if none was known
+    found: Found | None = None  # the motion solved for, where none was known
 
 
 class Walk:
@@ -144,7 +142,7 @@ class Walk:
         self,
         reason: str | None,
         reached: int | None = None,
-        found: tuple[PiecewiseMotion, Orbit, Approach] | None = None,
+        found: Found | None = None,
     ) -> Passed:
         """The finished transient, with the march to continue from."""
         self._begin()

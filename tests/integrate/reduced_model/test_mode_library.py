@@ -26,8 +26,8 @@ from rubhpc.kernels.contact_modes import (
     enter,
     event_free_interval,
     find_mode,
-    floor_log2,
 )
+from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.measuring import energy_forms
 from rubhpc.study.study import Contact, Integrator
 
