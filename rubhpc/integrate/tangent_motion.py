@@ -11,7 +11,7 @@ from rubhpc.integrate.lyapunov import N_ALIGNING, SPAN, Marches
 from rubhpc.integrate.marches.friction import FrictionMarch
 from rubhpc.integrate.measuring.regimes import N_ALL, N_FIRST, N_MOST
 from rubhpc.integrate.transient import pass_revolutions
-from rubhpc.kernels.tangent import ALL_CARRIED, TrailModes, carry_along, new_tangent
+from rubhpc.kernels.tangent import ALL_CARRIED, PIECE, TrailModes, carry_along, new_tangent
 from rubhpc.kernels.trail import BROKEN
 
 if TYPE_CHECKING:
@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 MOST_AT_ONCE = 16 * SPAN  # revolutions passed together after the record
+N_ALIGNING_RETURN = 2  # spans in which the difference from a return turns, within a record
+MOST_RETURNS = 4  # revolutions back to the return that is taken, at most
+REPEATED = 1e-8  # of a motion: a smaller difference from a return is rounding
 GOALS = N_FIRST, N_ALL, N_MOST  # spans that are read together (`regimes.by_growth`)
 
 
@@ -60,12 +63,7 @@ class TangentMotion:
         self._motion = np.cos(np.arange(2.0 * n))  # without a special direction
         self._beside: Marches | None = None
         self._grown: list[float] = []  # logarithms, revolution by revolution, not yet read
-        if trail is not None and self._carry(trail, 0, recording.revolutions):
-            grown, self._grown = np.array(self._grown[N_ALIGNING * SPAN :]), []
-            whole = grown.size - grown.size % SPAN
-            self.within = (grown[grown.size - whole :].reshape(-1, SPAN).sum(axis=1) / SPAN).tolist()
-            if recording.revolutions >= N_ALIGNING * SPAN:
-                self.n_aligning = 0
+        if trail is not None and self._carry_within(trail, recording.revolutions):
             self._leave_room(trail, recording.revolutions)
         self._spare = march.new_trail() if trail is None else trail
 
@@ -84,6 +82,43 @@ class TangentMotion:
             return self._beside.part(n_revolution)
         grown, self._grown = self._grown[:n_revolution], self._grown[n_revolution:]
         return float(sum(grown))
+
+    def _carry_within(self, trail: Trail, n_revolution: int) -> bool:
+        """Propagate the displacement along a record; False where its trail is broken.
+
+        The difference of a torus from an earlier return lies along the torus, and that of a chaotic motion
+        has lost what decays. A displacement without a special direction takes twice as long to align.
+        """
+        if trail.n_event[0] == BROKEN:
+            return False
+        n_within = max(0, n_revolution // SPAN - N_ALIGNING)
+        begun = 0
+        if n_revolution >= N_ALIGNING * SPAN:
+            self.n_aligning = 0
+            begun = n_revolution - (n_within + N_ALIGNING_RETURN) * SPAN
+            difference = self._from_return(trail, begun)
+            if difference is None:
+                begun = n_revolution - (n_within + N_ALIGNING) * SPAN
+            else:
+                self._motion = difference
+        self._carry(trail, 0, n_revolution, begun)
+        grown, self._grown = np.array(self._grown[len(self._grown) - n_within * SPAN :]), []
+        self.within = (grown.reshape(-1, SPAN).sum(axis=1) / SPAN).tolist()
+        return True
+
+    def _from_return(self, trail: Trail, revolution: int) -> Floats | None:
+        """Difference (2 n,) of the motion at a revolution from its nearest return; None where it repeats."""
+        march, clock = self._march, self._march.clock
+        ticks = clock.samples_per_revolution << clock.sample_level
+        returns = [_motion_at(trail, march, (revolution - back) * ticks) for back in range(MOST_RETURNS + 1)]
+        scale = np.repeat([clock.spin, 1.0], returns[0].size // 2)
+        apart = (returns[0] - returns[1:]) * scale
+        size = np.sqrt(np.square(apart).sum(axis=1))
+        nearest = int(size.argmin())
+        if not size[nearest] > REPEATED * np.linalg.norm(returns[0] * scale):
+            return None
+        difference: Floats = apart[nearest] / scale
+        return difference
 
     def _pass_on(self) -> bool:
         """Pass some more revolutions, or reduce their number; returns whether the motion can continue."""
@@ -123,8 +158,11 @@ class TangentMotion:
         n_event = max(1, 2 * int(trail.n_event[0]))
         self._most_at_once = min(self._most_at_once, max(1, trail.tick.size * n_revolution // n_event))
 
-    def _carry(self, trail: Trail, first: int, n_revolution: int) -> bool:
-        """Propagate the displacement along a trail that begins at tick `first`; False where it is broken."""
+    def _carry(self, trail: Trail, first: int, n_revolution: int, begun: int = 0) -> bool:
+        """Propagate the displacement along a trail that begins at tick `first`; False where it is broken.
+
+        It begins with a later revolution, `begun`.
+        """
         if trail.n_event[0] == BROKEN:
             return False
         march = self._march
@@ -132,10 +170,12 @@ class TangentMotion:
             trail.begun.shape[2],
             len(march.bodies.gap_jacobian),
             self._motion,
-            n_revolution,
+            n_revolution - begun,
         )
         clock = march.clock
-        modes, piece = _ModesOfTrail(trail, march), 0
+        first += begun * clock.samples_per_revolution << clock.sample_level
+        modes = _ModesOfTrail(trail, march)
+        tangent.reached[PIECE] = piece = _piece_at(trail, first)
         while piece != ALL_CARRIED:
             march.find(int(trail.states[piece]))
             piece = carry_along(
@@ -174,6 +214,7 @@ class _ModesOfTrail:
             np.zeros((k, m)),
             np.zeros(k, dtype=np.int64),
             isinstance(march, FrictionMarch),
+            march.setup.law.static_friction_ratio == 1.0,
         )
 
     def placed(self) -> TrailModes:
@@ -187,3 +228,22 @@ class _ModesOfTrail:
                 modes.opened[i] = march.gaps_watched(states)
                 self._is_read[i] = True
         return modes
+
+
+def _piece_at(trail: Trail, tick: int) -> int:
+    """The piece of a trail in which a motion is at a tick; at an event, the one before."""
+    return int(np.searchsorted(trail.tick[: trail.n_event[0]], tick))
+
+
+def _motion_at(trail: Trail, march: EventDrivenMarch, tick: int) -> Floats:
+    """The motion (2 n,) at a tick of a trail that begins at tick 0."""
+    piece = _piece_at(trail, tick)
+    states = int(trail.states[piece])
+    if states not in march.tables.mask:
+        march.find(states)
+    tables, (exponent, drift) = march.tables, march.exponents(states)
+    time = (tick - int(trail.tick[piece - 1] if piece > 0 else 0)) * march.clock.tick
+    begun, mode = trail.begun[piece], tables.mask.tolist().index(states)
+    z = (begun[0] + 1j * begun[1]) * np.exp(time * (exponent[0] + 1j * exponent[1])) + time * drift
+    motion: Floats = tables.motion_re[mode] @ z.real - tables.motion_im[mode] @ z.imag
+    return motion

@@ -42,6 +42,7 @@ class TrailModes(NamedTuple):
     drift: Floats  # (k, m), of the coordinates with exponent 0
     opened: Ints  # (k,), bits of the switch functions that are gaps
     has_states: bool  # whether pairs may slide in either sense and stick
+    slips_evenly: bool  # whether a pair that sticks begins to slide with the friction that it has
 
 
 class Tangent(NamedTuple):
@@ -150,7 +151,9 @@ def carry_along(
         shift, cosine_rate, sine_rate = 0.0, 0.0, 0.0
         move(tables, place, end - reached[PASSED], d)
         reached[PASSED] = end
-        if modes.has_states or is_touching:  # else a release with continuous forces
+        if is_touching or (
+            modes.has_states and (trail.states[k + 1] & ~trail.states[k] != 0 or not modes.slips_evenly)
+        ):
             read_begun(trail, k, z)
             move(tables, place, end - begun, z)
             for i in range(z.shape[1]):

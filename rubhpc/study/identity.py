@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 PHYSICS = 25  # version of the physics: raised whenever a study gives other results than before
 # Versions of what only some studies take, raised in place of PHYSICS and added to it for these.
-MODAL = 7  # method = "modal": modes kept, resolution of events, and last bits of multipliers and exponents
+MODAL = 8  # method = "modal": modes kept, resolution of events, and last bits of multipliers and exponents
 DIRECT = 9  # transient = "direct"
 CHANGING_SPEED = 32  # run-ups and drives
 COULOMB = 24  # set-valued friction

@@ -18,14 +18,17 @@ from rubhpc.integrate.periodic_motions.saltation import carried
 from rubhpc.integrate.periodic_motions.shooting import shoot
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
 from rubhpc.integrate.setup import prepare
-from rubhpc.integrate.tangent_motion import TangentMotion, _ModesOfTrail
+from rubhpc.integrate.tangent_motion import TangentMotion, _ModesOfTrail, _motion_at
+from rubhpc.integrate.transient import pass_revolutions
 from rubhpc.kernels import trail
 from rubhpc.kernels.case_progress import CONTACT_UNSOLVED
+from rubhpc.rig.reading import read_rig, with_keys
 from rubhpc.study.study import Contact, Integrator, Recording
 
 SPEED, CLEARANCE, FRICTION, N_REVOLUTION = 170.0, 80e-6, 0.2, 6
 SOFT = {"law": "penalty", "stiffness": 1e6, "damping": 20.0}
 LAWS = [{}, {"restitution": 0.5}, {"friction_law": "coulomb"}, SOFT, SOFT | {"friction_law": "coulomb"}]
+STATIC = {"friction_law": "coulomb", "static_friction_ratio": 1.5}
 
 
 LAW_NAMES = [("-".join(map(str, law.values())) or "sliding") for law in LAWS]
@@ -57,9 +60,9 @@ def ended(rig, speed, transient, law):
 
 @pytest.mark.parametrize(
     ("rig", "law"),
-    [(trial_rig(3), law) for law in LAWS]
+    [(trial_rig(3), law) for law in [*LAWS, STATIC]]
     + [(ring(16), {}), (ring(16), LAWS[2]), (walls(), {}), (walls(), LAWS[2])],
-    ids=[*LAW_NAMES, "ring-sliding", "ring-coulomb", "walls-sliding", "walls-coulomb"],
+    ids=[*LAW_NAMES, "static", "ring-sliding", "ring-coulomb", "walls-sliding", "walls-coulomb"],
 )
 def test_tangent_is_that_of_the_saltation_matrices(rig, law):
     final = ended(rig, SPEED, 5, law)
@@ -186,3 +189,37 @@ def test_after_short_steps_it_goes_on_beside_a_second_motion(monkeypatch):
     assert tangent._march.n_left == 1
     assert n_call > N_ALL // 4  # marches of two motions, span by span
     assert np.mean(found) == pytest.approx(math.log(abs(orbit.multipliers[0])), abs=0.02)
+
+
+def recorded(rig, speed, law, clearance, n_revolution):
+    """A march from the end of a transient through a record, and the trail of that."""
+    given = {"clearance": clearance, "friction": FRICTION, "samples_per_revolution": 64, "keep": ()}
+    state = simulate(rig, speed=speed, transient=60, revolutions=1, **given, **law).final
+    setup = prepare(rig, speed, contact=Contact(**law), integrator=Integrator(), samples_per_revolution=64)
+    march = march_of(setup.scheme, setup)(setup, clearance, FRICTION, state, None)
+    noted, recording = march.new_trail(), Recording(samples_per_revolution=64, revolutions=n_revolution)
+    march.keep(noted)
+    assert pass_revolutions(march, recording, n_revolution) is None
+    clock = march.clock
+    noted.tick[: noted.n_event[0]] += n_revolution * clock.samples_per_revolution << clock.sample_level
+    return setup, march, noted, recording
+
+
+@pytest.mark.parametrize("law", LAWS, ids=LAW_NAMES)
+def test_a_motion_is_read_from_its_trail(law):
+    """At the end of each revolution, and while pairs stick: as it is reached."""
+    _, march, noted, _ = recorded(trial_rig(3), SPEED, law, CLEARANCE, 1)
+    ticks = march.clock.samples_per_revolution << march.clock.sample_level
+    assert noted.n_event[0] > 0
+    assert _motion_at(noted, march, ticks) == pytest.approx(march.motion(), rel=1e-9, abs=1e-12)
+
+
+def test_on_a_torus_it_neither_grows_nor_decays_within_a_record():
+    """The exponent along a torus is zero; slow modes of three stators decay by 0.15 a revolution."""
+    rig = with_keys(read_rig("mokhtar2017"), {"stator.youngs_modulus": "30 GPa"})
+    rig = replace(rig, stator=tuple(replace(rig.stator[0], angle=2.0 * math.pi * i / 3) for i in range(3)))
+    speed = 2.6 * 2.0 * math.pi * 31.5596
+    setup, march, noted, recording = recorded(rig, speed, LAWS[2], 40e-6, 40)
+    tangent = TangentMotion(lambda state: march, march.final(), setup, recording, noted, march)
+    assert len(tangent.within) == (40 - 16) // 4
+    assert np.mean(tangent.within) == pytest.approx(0.0, abs=0.02)
