@@ -30,6 +30,7 @@ class HeldMode(NamedTuple):
     """
 
     n_coordinate: int  # m + 1 + q
+    n_ahead: int  # samples that are read from one set of coordinates: one where a pair is closed
     exponent: Complexes  # (width,), 1/s; that of the response is filled in
     is_pair: NDArray[np.bool_]  # (m,), whether a mode stands for a conjugate pair, and is doubled
     drive: Complexes  # (m,), share of the unbalance at unit speed
@@ -157,7 +158,7 @@ def retune_to(
     _look(held.output, moved, seen)
     for o in range(held.output.shape[0]):
         held.row[o, m] = complex(seen[0, o], seen[1, o])
-    retune_outputs(tables.output[mode], held.row, exponent, end, interval)
+    retune_outputs(tables.output[mode], held.row, exponent, end, interval, held.n_ahead)
     if tables.loss.shape[1] == 0:  # no energies
         return
     _retune_energies(tables, mode, held, x, factor)

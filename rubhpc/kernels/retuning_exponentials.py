@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit
-from rubhpc.kernels.contact_modes import DYING, FORCED_LEVEL, SAMPLES_AT_ONCE, ModeTables
+from rubhpc.kernels.contact_modes import DYING, FORCED_LEVEL, ModeTables
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -58,8 +58,10 @@ def retune_bounds(
 
 
 @jit
-def retune_outputs(output: Floats, row: Complexes, exponent: Complexes, end: int, interval: float) -> None:
-    """Outputs at coming samples by the first `end` coordinates; zeros that stay are left.
+def retune_outputs(
+    output: Floats, row: Complexes, exponent: Complexes, end: int, interval: float, n_ahead: int
+) -> None:
+    """Outputs at `n_ahead` coming samples by the first `end` coordinates; zeros that stay are left.
 
     Most are: a coordinate of an open stator is seen by the outputs of this stator alone.
     """
@@ -73,7 +75,7 @@ def retune_outputs(output: Floats, row: Complexes, exponent: Complexes, end: int
                 seen[count] = o
                 count += 1
         onward, ahead = _exponential(exponent[k], interval), 1.0 + 0j
-        for later in range(SAMPLES_AT_ONCE):
+        for later in range(n_ahead):
             for i in range(count):
                 o = seen[i]
                 value = ahead * row[o, k]

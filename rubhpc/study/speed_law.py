@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     Ints = NDArray[np.int64]
 
 LAG = 0.003  # rad, by which the shaft may depart from its angle within a piece
-LONGEST_PIECE = 16  # revolutions
+PIECES = (16, 12, 8, 6, 4, 3, 2, 1)  # revolutions in a piece
+LONGEST_PIECE = PIECES[0]
 SAME_SAMPLE = 1e-6  # intervals of samples, within which a bend of the speed is at a sample
 MOST_REVOLUTIONS = 100_000  # of a case whose speed changes
 
@@ -127,8 +128,8 @@ def cut(
     """Cut a law into pieces, each of which is taken at its mean speed.
 
     Under the acceleration a the shaft's angle departs from that of a steady spin by `a T^2 / 12` over a piece
-    of the duration T, which is to be within what is allowed: pieces are of 1, 2, 4 ... revolutions or of
-    halves, quarters ... of one. A bend of the speed lies between two samples, a piece by themselves.
+    of the duration T, which is to be within what is allowed: pieces are of `PIECES` revolutions or of halves,
+    quarters ... of one. A bend of the speed lies between two samples, a piece by themselves.
 
     Parameters
     ----------
@@ -158,13 +159,17 @@ def cut(
     corners = (bends / per_revolution).tolist()
     cuts, turn = [0], 0
     while turn < n:
-        count = LONGEST_PIECE
-        while count > 1 and (
-            turn + count > n
-            or any(turn < corner < turn + count for corner in corners)
-            or abs(rate[turn]) * (time[turn + count] - time[turn]) ** 2 > 12.0 * allowed(speed[turn], count)
-        ):
-            count //= 2
+        until = min([n, *(corner for corner in corners if corner > turn)])
+        count = next(
+            count
+            for count in PIECES
+            if count == 1
+            or (
+                turn + count <= until
+                and abs(rate[turn]) * (time[turn + count] - time[turn]) ** 2
+                <= 12.0 * allowed(speed[turn], count)
+            )
+        )
         parts = 1
         if count == 1:
             within = law.acceleration[law.between(time[turn], time[turn + 1])]

@@ -96,6 +96,7 @@ def held_mode(
     phasor: Complexes,
     output: Floats,
     width: int,
+    n_ahead: int,
     springs: Springs,
     is_balanced: bool,
 ) -> HeldMode:
@@ -111,6 +112,8 @@ def held_mode(
         Unbalance at unit speed.
     output : (o, 3 n)
         `output_operators`, side by side.
+    n_ahead : int
+        Samples that are read from one set of coordinates.
     springs : Springs
         The pressed ones.
     is_balanced : bool
@@ -135,6 +138,7 @@ def held_mode(
         resisting[:, :end] -= linear.across @ mode.switch
     return HeldMode(
         n_coordinate=end,
+        n_ahead=n_ahead,
         exponent=exponent,
         is_pair=doubled > 1.5,
         drive=enter[:, n:] @ linear.seen,

@@ -31,6 +31,7 @@ from rubhpc.integrate.reduced_model.mode_library import ModeLibrary, width_witho
 from rubhpc.integrate.reduced_model.reduction import directions
 from rubhpc.integrate.reduced_model.table_stack import TableStack
 from rubhpc.integrate.reduced_model.touching import OpenBodies, contact_mode_among, open_bodies
+from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
 from rubhpc.kernels.retuning import retune
 from rubhpc.kernels.retuning_laws import Springs
 
@@ -375,6 +376,7 @@ class RetunedLibrary(ModeLibrary):
             phasor=self._phasor,
             output=self._output,
             width=self.width,
+            n_ahead=1 if self._closed_pairs(mode.mask) else SAMPLES_AT_ONCE,
             springs=self._springs_of(mode),
             is_balanced=self._is_measured,
         )

@@ -170,6 +170,8 @@ def test_a_tuned_mode_is_the_mode_at_that_speed(q, law):
         expected = law.tables(library, reduced, base, mask, levels)
         for name in expected._fields:
             values, anew = getattr(found, name)[place], getattr(expected, name)[0]
+            if name == "output" and library._closed_pairs(mask):  # only the first sample is read
+                values, anew = values[:, : len(library._output)], anew[:, : len(library._output)]
             largest = np.abs(anew).max(initial=0.0)
             assert np.abs(values - anew).max(initial=0.0) <= 1e-9 * largest, name
 
