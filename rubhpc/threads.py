@@ -40,7 +40,7 @@ def on_one_thread(function: Callable[P, T]) -> Callable[P, T]:
 
 
 def one_thread() -> AbstractContextManager[object]:
-    """Hold them to one thread within a context; it costs some 50 us."""
+    """Hold them to one thread within a context; it costs some 10 us."""
     limit: AbstractContextManager[object] = _controller().limit(limits=1)
     return limit
 

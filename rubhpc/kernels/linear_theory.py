@@ -17,6 +17,7 @@ Ints = NDArray[np.int64]
 
 ROUNDING = float(np.finfo(float).eps)
 MOST_SQUARINGS = 60  # of the monodromy matrix, until nothing is left of it
+NEUTRAL = 1e12  # times the energy of the first period, in all periods: what does not decay
 FIRST, LAST, BEGINS, ENDS = range(4)  # items of `Watched.parts`
 
 
@@ -34,10 +35,11 @@ class Theory(NamedTuple):
 
 
 @jit_lean_sum
-def fill_theory(monodromy: Floats, scale: Floats, energy: Floats, rooms: Floats) -> int:
-    """Fill in the theory of a monodromy matrix (m, m) with multipliers within the unit circle: its rank.
+def fill_theory(monodromy: Floats, scale: Floats, energy: Floats, rooms: Floats) -> tuple[int, bool]:
+    """Fill in the theory of a monodromy matrix (m, m): its rank, and whether disturbances decay.
 
     What a column has outside of the span of others, if that is less than roundings of the largest, is none.
+    Where a multiplier lies outside of the unit circle, or on it, the sums end with the first that shows it.
 
     Parameters
     ----------
@@ -50,7 +52,7 @@ def fill_theory(monodromy: Floats, scale: Floats, energy: Floats, rooms: Floats)
     """
     span, reading, onward, sums = rooms[0], rooms[1], rooms[2], rooms[3]
     power, turned, moved, more = rooms[4], rooms[5], rooms[6], rooms[7]
-    rank = find_span(monodromy, scale, span, reading, power, turned)
+    rank, first = find_span(monodromy, scale, span, reading, power, turned), 0.0
     for a in range(rank):
         for b in range(rank):
             power[a, b] = product(reading[a], span[b])
@@ -59,24 +61,27 @@ def fill_theory(monodromy: Floats, scale: Floats, energy: Floats, rooms: Floats)
             for i in range(energy.size):
                 total += energy[i] * span[a, i] * span[b, i]
             sums[a, b] = total
+        first += sums[a, a]
+    is_stable = True
     for _ in range(MOST_SQUARINGS):
         for a in range(rank):
             for b in range(rank):
                 turned[b, a] = power[a, b]
         multiply(rank, sums, power, moved)
         multiply(rank, turned, moved, more)
-        added, largest = 0.0, 0.0
+        added, largest, total = 0.0, 0.0, 0.0
         for a in range(rank):
             for b in range(rank):
                 sums[a, b] += more[a, b]
-            added, largest = max(added, more[a, a]), max(largest, sums[a, a])
-        if added <= ROUNDING * largest:  # no entry is larger
+            added, largest, total = max(added, more[a, a]), max(largest, sums[a, a]), total + sums[a, a]
+        is_stable = total <= NEUTRAL * first
+        if added <= ROUNDING * largest or not is_stable:  # no entry is larger than those of the diagonal
             break
         multiply(rank, power, power, moved)
         for a in range(rank):
             for b in range(rank):
                 power[a, b] = moved[a, b]
-    return rank
+    return rank, is_stable
 
 
 @jit_lean_sum

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 PHYSICS = 25  # version of the physics: raised whenever a study gives other results than before
 # Versions of what only some studies take, raised in place of PHYSICS and added to it for these.
 MODAL = 8  # method = "modal": modes kept, resolution of events, and last bits of multipliers and exponents
-DIRECT = 9  # transient = "direct"
+DIRECT = 10  # transient = "direct"
 CHANGING_SPEED = 33  # run-ups and drives
 COULOMB = 24  # set-valued friction
 PENALTY = 1  # method = "modal" with a penalty, for whose sake modes are kept

@@ -24,7 +24,8 @@ def monodromy():
 
 def theory_of(matrix, scale, energy):
     rooms = np.full((8, N, N), np.nan)
-    rank = fill_theory(matrix, scale, energy, rooms)
+    rank, is_stable = fill_theory(matrix, scale, energy, rooms)
+    assert is_stable
     span, reading, onward, sums = rooms[:4]
     return Theory(
         span[:rank].copy(), reading[:rank].copy(), onward[:rank, :rank].copy(), sums[:rank, :rank].copy()
@@ -54,6 +55,16 @@ def test_sums_are_the_energies_of_all_periods_to_come(monodromy):
         moved = matrix @ moved
         total += energy @ moved**2
     assert y @ theory.sums @ y == pytest.approx(total, rel=1e-10)
+
+
+@pytest.mark.parametrize("largest", [1.0, 1.001, 1e3, 1e60])
+def test_sums_of_what_does_not_decay_stay_finite(monodromy, largest):
+    matrix, scale = monodromy
+    rooms = np.full((8, N, N), np.nan)
+    rank, is_stable = fill_theory(largest / 0.97 * matrix, scale, scale**2, rooms)
+    assert not is_stable
+    assert np.isfinite(rooms[3, :rank, :rank]).all()
+    assert fill_theory(0.0 * matrix, scale, scale**2, rooms) == (0, True)
 
 
 def test_contacts_are_looked_at_until_so_much_of_the_distance_is_left(monodromy):

@@ -107,6 +107,8 @@ class Candidate:
 
     Attributes
     ----------
+    n_period : int
+        Periods from one look to the next.
     n_missed : int
         How often the case was seen not to draw near.
     """
@@ -114,6 +116,7 @@ class Candidate:
     def __init__(self, piecewise: PiecewiseMotion, orbit: Orbit) -> None:
         """Take a motion that was found."""
         self.piecewise, self.orbit, self.period = piecewise, orbit, orbit.period
+        self.n_period = max(1, LOOK // orbit.period)
         self.n_missed = 0
 
     def strays(self, passed: Floats) -> float:
@@ -133,6 +136,11 @@ class Candidate:
     def approach(self) -> Approach:
         """Distances from it."""
         return Approach.to(self.piecewise, self.orbit.monodromy)
+
+    @cached_property
+    def to_next_look(self) -> Floats:
+        """Derivative of the motion at a look by that at the one before, (2 n, 2 n)."""
+        return np.linalg.matrix_power(self.orbit.monodromy, self.n_period)
 
     @cached_property
     def onward(self) -> Onward:
@@ -178,11 +186,7 @@ def draws_near(walk: Walk, candidate: Candidate, until: int) -> tuple[bool, str 
     it disobeys the theory in further ones.
     """
     piecewise, orbit, approach = candidate.piecewise, candidate.orbit, candidate.approach
-    n_period = max(1, LOOK // orbit.period)
-    span, onward = (
-        n_period * orbit.period,
-        np.linalg.matrix_power(orbit.monodromy, n_period),
-    )  # to the next look
+    span, onward = candidate.n_period * orbit.period, candidate.to_next_look
     least = -(-WATCHED // span)
     there = nothing(piecewise.setup) * piecewise.size(orbit.motion)
     looks: list[tuple[float, float, float]] = []  # what it strays, is to lose and loses, as shares
@@ -236,10 +240,10 @@ def _agree(looks: list[tuple[float, float, float]], least: int) -> bool:
 def _search(
     piecewise: PiecewiseMotion, states: int, passed: Floats, n_revolution: int, missed: Collection[int]
 ) -> Candidate | None:
-    """Return the stable periodic motion that the last ones lead to: of one revolution, or as they return.
+    """Return the stable periodic motion that the last ones lead to: as they return, or of one revolution.
 
-    The first that they follow to, else of two the nearer one. An unstable motion whose disturbances change
-    sides in every period is followed to twice its period. Periods that were `missed` before come last.
+    The first that they may follow to, else of two the nearer one. An unstable motion whose disturbances
+    change sides in every period is followed to twice its period. Periods that were `missed` before come last.
     """
     found: list[tuple[float, Candidate]] = []
     for period in sorted(_periods(piecewise, passed, n_revolution), key=missed.__contains__):
@@ -247,17 +251,20 @@ def _search(
         while one and one.is_doubled and (asked := 2 * asked) <= LONGEST_PERIOD:
             one = _solved(piecewise, states, passed, asked)
         if one and one.approach.is_stable:
-            if one.strays(passed) <= LINEAR:
+            if one.strays(passed) <= STRAYS:
                 return one
             found.append((piecewise.size(one.orbit.motion - passed[-1]), one))
     return min(found, key=lambda one: one[0])[1] if found else None
 
 
 def _periods(piecewise: PiecewiseMotion, passed: Floats, n_revolution: int) -> list[int]:
-    """1, and the least number of revolutions after which the motion comes back far nearer than after one."""
+    """The least number of revolutions after which the motion comes back far nearer than after one, and 1.
+
+    The longer comes first: where the motion has the period 1, that is found by it as well.
+    """
     longest = min(len(passed) - 1, n_revolution // PATIENCE, LONGEST_PERIOD)
     back = (passed[-1] - passed[::-1][1 : longest + 1]) ** 2 @ piecewise.energy
-    return [1, *(np.flatnonzero(back[1:] <= NEARER**2 * back[:1]) + 2)[:1].tolist()]
+    return [*(np.flatnonzero(back[1:] <= NEARER**2 * back[:1]) + 2)[:1].tolist(), 1]
 
 
 def _solved(piecewise: PiecewiseMotion, states: int, passed: Floats, period: int) -> Candidate | None:

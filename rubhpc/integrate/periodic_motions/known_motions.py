@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from scipy.linalg.lapack import dgeev
 
 from rubhpc.integrate.periodic_motions.saltation import monodromy
 from rubhpc.kernels.linear_theory import Theory, fill_theory
@@ -29,7 +30,6 @@ LINEAR = 0.1  # of its distance, by which it may differ from that then
 HALF = 1 / 4  # of the square of its distance, that is left when it has drawn near
 THERE = 1e-8  # of the motion's size: a case as near as that has arrived
 TICKS = 4  # times what a point of the orbit turns in the resolution of events: nearer no simulation comes
-NEUTRAL = 1e12  # times the energy of the first period, in all periods: what does not decay
 SAME = 1e-7  # of the motion's size: motions as near as that are one
 
 
@@ -65,15 +65,14 @@ class Approach:
         """Sum the energies of all periods."""
         self.monodromy, m = monodromy, energy.size
         rooms = np.empty((8, m, m))
-        rank = fill_theory(monodromy, np.sqrt(energy) if scale is None else scale, energy, rooms)
+        weights = np.sqrt(energy) if scale is None else scale
+        rank, self.is_stable = fill_theory(monodromy, weights, energy, rooms)
         self.theory = Theory(
             rooms[0, :rank].copy(),
             rooms[1, :rank].copy(),
             rooms[2, :rank, :rank].copy(),
             rooms[3, :rank, :rank].copy(),
         )
-        first = float((self.theory.span**2 @ energy).sum())
-        self.is_stable = bool(rank == 0 or self.theory.sums.trace() < NEUTRAL * first)
         self._energy = energy
 
     @classmethod
@@ -94,8 +93,11 @@ class Approach:
     @cached_property
     def multiplier(self) -> complex:
         """The largest; of a pair either."""
-        found = np.linalg.eigvals(self.theory.onward)
-        return complex(found[np.abs(found).argmax()]) if found.size else 0j
+        if self.theory.onward.size == 0:
+            return 0j
+        real, imag, *_ = dgeev(self.theory.onward, compute_vl=0, compute_vr=0)
+        k = int((real**2 + imag**2).argmax())
+        return complex(real[k], imag[k])
 
     def square(self, apart: Floats) -> float:
         """Square of the distance (2 n,)."""
