@@ -95,6 +95,16 @@ class Passing:
             return begun
         return carried(before, change, self._march, setup, begun)
 
+    def is_open(self, begun: State | Place, setup: PieceSetup) -> bool:
+        """Whether nothing touches as a piece begins, about the sag of its middle too."""
+        if begun.contact_force.any():
+            return False
+        if isinstance(begun, State):
+            return True
+        if self._march is None:
+            return False
+        return bool((self._march.gaps(setup, begun) >= 0.0).all())
+
     def standing(self, setup: PieceSetup, end: State | Place, n_sample: int) -> Standing | None:
         """End of the last piece in its own modes, if it has any."""
         if self._march is None or not isinstance(end, Place):

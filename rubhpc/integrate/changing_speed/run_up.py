@@ -21,7 +21,8 @@ from rubhpc.integrate.changing_speed.passing import Passing, state_at
 from rubhpc.integrate.changing_speed.pieces import Pieces
 from rubhpc.integrate.changing_speed.sample_times import bring_to_angles
 from rubhpc.integrate.changing_speed.turns import Turns
-from rubhpc.integrate.changing_speed.twist_ramp import moved
+from rubhpc.integrate.changing_speed.twist_ramp import moved, sag_ramp
+from rubhpc.integrate.marches.modal import Place
 from rubhpc.integrate.measuring.samples import empty_samples, lift_samples, new_accumulator
 from rubhpc.integrate.record import State
 from rubhpc.integrate.start import start_of
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.model import Model
     from rubhpc.integrate.changing_speed.piece_setup import PieceSetup
-    from rubhpc.integrate.marches.modal import Place
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.kernels.accumulators import Accumulator
     from rubhpc.study.speed_law import SpeedLaw
@@ -141,12 +141,21 @@ def integrate_run_up(
         goes_on = last is not None and last[0].goes_on_in(
             setup, float(accelerations[piece - 1]), float(accelerations[piece])
         )
-        if (
-            last is not None
-            and reached is not None
-            and not goes_on
-            and (last[0].held is not setup.held or setup.held.is_followed)
-        ):
+        is_first = reached is None
+        if reached is None:
+            assert isinstance(initial, Initial)
+            reached = start_of(initial, setup, clearance, law.speed[0])
+            goes_on = is_contact_free(initial, reached)
+        ramp = None
+        if setup.held.sags and passing.is_open(reached, setup):
+            end, acceleration = piece + len(block), float(accelerations[piece])
+            lasts = float(times[end] - times[piece])
+            ramp = sag_ramp(setup.held, acceleration, float(at_cuts[piece]), float(at_cuts[end]), lasts)
+            if not is_first:
+                reached = ramp.about_middle(reached, setup)
+            elif not goes_on:  # at rest, while the sag moves
+                reached = moved(reached, setup, none, -ramp.rate)
+        if last is not None and not goes_on and (last[0].held is not setup.held or setup.held.is_followed):
             ended = passing.standing(last[0], reached, last[1])
             # Ringing by a jump of the acceleration is not caused by the matrices.
             jump = float(accelerations[piece] - accelerations[piece - 1])
@@ -159,10 +168,6 @@ def integrate_run_up(
                 held_from = times[piece]
         while not reason and (place := piece - begins_at) < len(block):
             first = int(cuts[piece])
-            if reached is None:
-                assert isinstance(initial, Initial)
-                reached = start_of(initial, setup, clearance, law.speed[0])
-                goes_on = is_contact_free(initial, reached)
             stretch, before_it, follows = None, (earlier, before[piece]), goes_on or place > 0
             if not late[piece]:
                 stretch = passing.take_several(
@@ -191,6 +196,10 @@ def integrate_run_up(
                 n_done = first // per_revolution + len(passed.accumulators) - 1
                 reason = f"{passed.reason} in revolution {n_done + 1}"
             piece += 1
+        if ramp is not None:
+            ramp.lift(whole[:, cuts[begins_at] : cuts[piece]], setup)
+            if isinstance(reached, Place) and not reached.contact_force.any():
+                reached = ramp.after(reached, setup)
         if reason:
             break
         last = block.last, size

@@ -127,7 +127,12 @@ class SpeedRanges:
             held.twist = sag_under(model.rotor, -free.share)
             held.lean = sag_under(model.rotor, -0.5 * tilted)
         else:
-            held.lean = sag_under(model.rotor, -self._inertia - tilted)
+            force = -self._inertia - tilted
+            if held.sags:  # dampers act against the rate of the sag
+                rotor, (_, below, above) = model.rotor, held.sags
+                rate = (above - below) / ((NODES[2] - NODES[1]) * reach)
+                force = force - (rotor.damping + speed * rotor.gyroscopic) @ rate
+            held.lean = sag_under(model.rotor, force)
         return held
 
     def linear(self, speed: float, *, is_whole: bool = False) -> Linear:

@@ -1,4 +1,4 @@
-"""The twist of the shaft under a drive whose torque changes linearly within a piece."""
+"""A sag that changes linearly: the twist under a drive's torque in a piece, that by bearings in a block."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rubhpc.integrate.marches.modal import Place
 from rubhpc.integrate.record import State
 
 if TYPE_CHECKING:
-    from rubhpc.integrate.changing_speed.piece_setup import PieceSetup
+    from rubhpc.integrate.changing_speed.piece_setup import HeldMatrices, PieceSetup
 
 Floats = NDArray[np.float64]
 
@@ -26,6 +26,7 @@ class TwistRamp(NamedTuple):
 
     half: Floats  # (n_rotor_dof,), from the middle of the piece to its end, m and rad
     rate: Floats  # (n_rotor_dof,), m/s and rad/s
+    constant: Floats | None = None  # (n_probe,), the half as probes see it; None: by rows that do not change
 
     @property
     def moves(self) -> bool:
@@ -55,7 +56,18 @@ class TwistRamp(NamedTuple):
         n, first_probe = self.half.size, 4 + 3 * model.n_place
         whole[:3] += np.outer(replace(model, sag=self.half).output_sag, share)
         positions, rates, _ = model.probe_rows[:, :, :n]
-        whole[first_probe:] += np.outer(positions @ self.half, share) + (rates @ self.rate)[:, np.newaxis]
+        seen = positions @ self.half if self.constant is None else self.constant
+        whole[first_probe:] += np.outer(seen, share) + (rates @ self.rate)[:, np.newaxis]
+
+
+def sag_ramp(
+    held: HeldMatrices, acceleration: float, first: float, last: float, duration: float
+) -> TwistRamp:
+    """How bearings that follow the speed move the sag from the first speed to the last one, rad/s."""
+    begin, end = (held.sagging(0.0, acceleration, speed) for speed in (first, last))
+    half = 0.5 * (end.sag - begin.sag)
+    constant = 0.5 * (end.probe.constant - begin.probe.constant) if begin.probe and end.probe else None
+    return TwistRamp(half, 2.0 / duration * half, constant)
 
 
 def moved(motion: State | Place, setup: PieceSetup, displacement: Floats, velocity: Floats) -> State | Place:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rubhpc.fem.statics import sag_at_stators
 from rubhpc.integrate.marches.contact_sets import ContactSets
 from rubhpc.integrate.marches.march import ALL_SAMPLES
 from rubhpc.integrate.marches.met_modes import MetModes, NoClosedForm
@@ -69,6 +70,12 @@ class EventDrivenMarch(ContactSets):
             n = self.bodies.stiffness.shape[0]
             self._motion[:n] += setup.reduced.project[:, : moved.size] @ moved
         self._enter_first(place.contact_force)
+
+    def gaps(self, setup: ModalSetup, place: Place) -> Floats:
+        """Gaps (q,), m, of a motion about the sag of a set-up in place of its own."""
+        displacement = place.motion[: self.bodies.stiffness.shape[0]]
+        open_: Floats = self._at_rest - sag_at_stators(setup.model)[0]
+        return open_ + self.bodies.gap_jacobian @ displacement
 
     @property
     def transitions(self) -> Transitions:

@@ -5,6 +5,7 @@ contacts are rigid, and the reference is Moreau's: impulses that leave no pair a
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -144,6 +145,37 @@ def test_accelerations_of_a_steep_passage(speeds):
     )
     off = {p.name: error(found[f"probe_{p.name}"].values, s) for p, s in zip(PROBES, expected, strict=True)}
     assert max(off.values()) < 5e-3, off
+
+
+@pytest.mark.parametrize("at_rest", [False, True])
+def test_the_sag_follows_the_bearings(at_rest):
+    """Without unbalance a shaft stands in the sag at each speed, and its weight on the bearings.
+
+    The sag moves evenly, and what moves with it does not swing.
+    """
+    whole, law = machine(), SpeedLaw(time=(0.0, 0.5), speed=(200.0, 345.0))
+    rig = replace(whole, rotor=replace(whole.rotor, unbalance=()))
+    probes = [Probe(name=f"p{node}", node=node, quantity="bearing_force") for node in (1, 5, 7)]
+    found = run_up(
+        rig,
+        start=200.0,
+        stop=345.0,
+        time=0.5,
+        clearance=1.0,
+        probes=probes,
+        samples_per_revolution=PER_REVOLUTION,
+        initial={"from": "rest"} if at_rest else None,
+    )
+    turned = 2.0 * np.pi / PER_REVOLUTION * np.arange(found.sizes["sample"])
+    base, speeds = assemble(rig), law.at_angle(turned)[1]
+    row = base.rotor.index(9, "v")
+    sag = np.array([model_at(base, speed).sag[row] for speed in speeds])
+    off = np.abs(found.vertical.values - sag).max() / np.ptp(sag)
+    assert off < 0.01, off
+    up = np.array([float(name == "v") for _, name in base.rotor.degrees])
+    weight = 9.81 * up @ base.rotor.mass @ up
+    carried = sum(found[f"probe_p{node}"].values for node in (1, 5, 7))
+    assert np.abs(carried + weight).max() < 1e-3 * weight
 
 
 def test_bends_and_the_start_leave_no_spikes():
