@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     import xarray as xr
     from matplotlib.axes import Axes
+    from matplotlib.lines import Line2D
     from numpy.typing import NDArray
 
     from postproc.figures.options import Axis, Positive
@@ -85,20 +86,23 @@ def draw_bode(
     is_sparse = data.sizes[along] < 40
     over = next((dim for dim in data[f"amplitude_{signals[0]}"].dims if dim != along), None)
     style: dict[str, Any] = {"marker": "." if is_sparse else "", "markersize": 4, "linewidth": 0.8}
-    n_curve, peaks = 0, []
+    n_curve = 0
+    peaks: list[tuple[ResponsePeak, Line2D]] = []
     for name in signals:
         amplitude, phase = data[f"amplitude_{name}"], data[f"phase_{name}"]
         curves = zip(overlaid(amplitude, along), overlaid(phase, along), strict=True)
-        lag: np.ndarray[Any, Any] | None = None
+        before: tuple[Floats, Floats] | None = None
         for i_case, ((case, height), (_, lead)) in enumerate(curves):
             own_speeds = speeds.isel({over: i_case}) if over in speeds.dims else speeds
             rpm = own_speeds.values * RPM
             own = name.removeprefix("probe_").replace("_", " ") if len(signals) > 1 else None
             label = ", ".join(text for text in (own, case) if text) or None
-            top.plot(rpm, height.values * scale.factor, label=label, **style)
-            lag = written_lag(lead.values, lag)
+            (curve,) = top.plot(rpm, height.values * scale.factor, label=label, **style)
+            lag = written_lag(lead.values, rpm, before)
+            before = rpm, lag
             if order == 1.0:
-                peaks += peaks_of(own_speeds.values, height.values * scale.factor, lag)
+                found = peaks_of(own_speeds.values, height.values * scale.factor, lag)
+                peaks += [(peak, curve) for peak in found]
             bottom.plot(rpm, lag, **style)
             n_curve += 1
     shown = [signal_name(data[f"amplitude_{signals[0]}"])] if len(signals) == 1 else []
@@ -140,19 +144,24 @@ def peaks_of(speed: Floats, height: Floats, lag: Floats) -> list[ResponsePeak]:
     return found
 
 
-def _name_peaks(ax: Axes, peaks: Sequence[ResponsePeak]) -> None:
-    """Write speed (rpm) and amplification factor at peaks, from the highest, where there is room."""
+def _name_peaks(ax: Axes, peaks: Sequence[tuple[ResponsePeak, Line2D]]) -> None:
+    """Write speed (rpm) and amplification factor at peaks, from the highest, where there is room.
+
+    The words are above all curves, in the colour of their own.
+    """
     taken: list[float] = []
-    for peak in sorted(peaks, key=lambda peak: -peak.amplitude):
+    room, curves = ROOM * np.ptp(ax.get_xlim()), [np.asarray(line.get_data()) for line in ax.lines]
+    for peak, line in sorted(peaks, key=lambda named: -named[0].amplitude):
         rpm = RPM * peak.speed
-        if any(abs(rpm - other) < ROOM * np.ptp(ax.get_xlim()) for other in taken):
+        if any(abs(rpm - other) < room for other in taken):
             continue
         taken.append(rpm)
         words = f"{rpm:.0f} rpm, AF {peak.amplification_factor:.3g}"
+        top = max(float(np.nanmax(y[abs(x - rpm) < 0.6 * room], initial=peak.amplitude)) for x, y in curves)
         place: dict[str, Any] = {"xytext": (0, 2), "textcoords": "offset points", "ha": "center"}
-        ax.annotate(words, (rpm, peak.amplitude), va="bottom", fontsize=6, **place)
-    if peaks:
-        ax.set_ylim(top=max(ax.get_ylim()[1], 1.2 * max(peak.amplitude for peak in peaks)))
+        behind = {"facecolor": "white", "edgecolor": "none", "pad": 0.5}
+        ax.annotate(words, (rpm, top), va="bottom", fontsize=6, color=line.get_color(), bbox=behind, **place)
+        ax.set_ylim(top=max(ax.get_ylim()[1], 1.2 * top))
 
 
 def signal_name(amplitude: xr.DataArray) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from postproc.figures.drawing import Drawing
-from postproc.figures.run_up_marks import draw_rotation, name_speeds
+from postproc.figures.run_up_marks import APART, draw_rotation, name_speeds
 from postproc.signals.run_up_spectra import mean_positions
 from postproc.signals.waveforms import seen_by_two
 from postproc.store.rig_of_case import rig_of
@@ -72,7 +72,8 @@ def draw_centreline(
         ylabel=scale.label("Vertical mean position"),
     )
     ax.plot(x, y, linewidth=0.9)
-    name_speeds(ax, [(x, y)], speed)
+    extent = np.hypot(np.nanmax(x) - np.nanmin(x), np.nanmax(y) - np.nanmin(y)) / (2.0 * np.sqrt(2.0) * reach)
+    name_speeds(ax, [(x, y)], speed, min(APART, 0.5 * extent))  # two at least in a large clearance
     draw_rotation(ax)
     ax.set_title(f"Centreline of {where}, speeds in rpm", fontsize=8)
     return ax

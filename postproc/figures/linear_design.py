@@ -65,7 +65,7 @@ def unbalance_response(design: xr.Dataset, node: int) -> Drawing:
             label = f"probe at {math.degrees(angle):.3g}\N{DEGREE SIGN}"
             seen = shown.sel(probe=angle)
             amplitude.plot(rpm, 1e6 * seen["amplitude"].values, label=label, **style)
-            lags.append(written_lag(seen["phase"].values, lags[-1] if lags else None))
+            lags.append(written_lag(seen["phase"].values, rpm, (rpm, lags[-1]) if lags else None))
             phase.plot(rpm, lags[-1], **style)
         highest = 1e6 * float(shown["major_axis"].max()) or 1.0
         amplitude.set(ylabel="Amplitude (\N{MICRO SIGN}m)", ylim=(0, 1.25 * highest), xlim=(rpm[0], rpm[-1]))

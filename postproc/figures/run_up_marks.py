@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 RPM = 30.0 / math.pi
+APART = 0.085  # of the diagonal of a plot, between named speeds
 _STEPS = 60  # of speed, on which modes are followed
 
 
@@ -62,8 +63,12 @@ def written_speeds(speeds: Iterable[float]) -> str:
     return f"critical speed{'s' if len(numbers) > 1 else ''}, {', '.join(numbers)} rpm"
 
 
-def name_speeds(ax: Axes, curves: Sequence[tuple[Floats, Floats]], speed: Floats) -> None:
+def name_speeds(
+    ax: Axes, curves: Sequence[tuple[Floats, Floats]], speed: Floats, apart: float = APART
+) -> None:
     """Mark round speeds (of rad/s) along the first curve, with the rpm, where they are far enough apart.
+
+    That is `apart` times the diagonal of the plot.
 
     Each is written where it covers least of curves and of other labels, those of the grid included, with a
     leader where that is far.
@@ -74,7 +79,7 @@ def name_speeds(ax: Axes, curves: Sequence[tuple[Floats, Floats]], speed: Floats
     middle = 0.5 * sum(ax.get_xlim()), 0.5 * sum(ax.get_ylim())
     written = _Written(ax, curves)
     for text, px, py in _round_speeds(x, y, RPM * speed):
-        if any(math.hypot(px - a, py - b) < 0.085 * size for a, b in taken):
+        if any(math.hypot(px - a, py - b) < apart * size for a, b in taken):
             continue
         taken.append((px, py))
         ax.plot(px, py, ".", color="k", markersize=3, zorder=4)

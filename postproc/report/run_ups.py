@@ -60,7 +60,8 @@ def run_up_facts(store: xr.Dataset) -> dict[str, Any]:
 
 
 def _signal(store: xr.Dataset) -> str:
-    """The signal that is drawn: that of the first probe, or the vertical motion."""
+    """The signal that is drawn: of the first probe, if possible of a displacement, or the vertical motion."""
     prefix = AMPLITUDE + PROBE
     probes = [str(name).removeprefix(AMPLITUDE) for name in store.data_vars if str(name).startswith(prefix)]
-    return probes[0] if probes else "vertical"
+    displaced = [name for name in probes if store[AMPLITUDE + name].attrs.get("units") == "m"]
+    return (displaced or probes or ["vertical"])[0]

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    Floats = NDArray[np.float64]
+
 WHOLE = 0.02  # of a revolution: by how much an order may miss a whole number of periods of a record
 NEAR = 1e-3  # of an order, within which a run-up follows it
 JUMP = 0.25 * np.pi  # rad a revolution, faster than the phase of an order of a window of six goes
@@ -79,28 +81,38 @@ def order_over_speed(
     return found
 
 
-def written_lag(lead: NDArray[np.float64], before: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
-    """Return the lag of a phase, degrees: the whole turns are left out that take it far from another one.
+def written_lag(lead: Floats, speed: Floats, before: tuple[Floats, Floats] | None = None) -> Floats:
+    """Return the lag of a phase, degrees, less whole turns.
+
+    From one stretch of known phase to the next these are unknown.
 
     Parameters
     ----------
     lead : (n,)
         rad; NaN where there is none.
-    before : (n,), optional
-        Lag of the curve drawn before, near which it begins; the first one begins from -60 to 300 degrees.
+    speed : (n,)
+        Of the shaft.
+    before : tuple of (m,), optional
+        Speed and lag of the curve drawn before, near which each stretch is drawn. Without it the lag at the
+        lowest speed is from -60 to 300 degrees.
     """
     lag = -np.degrees(lead)
-    if np.isfinite(lag).any():
-        near = _FIRST_LAG if before is None or not np.isfinite(before).any() else _first(before)
-        lag -= 360.0 * np.round((_first(lag) - near) / 360.0)
+    known = np.flatnonzero(np.isfinite(lag) & np.isfinite(speed))
+    if not known.size:
+        return lag
+    if before is None or not np.isfinite(before[1]).any():
+        slowest = lag[known[speed[known].argmin()]]
+        found: Floats = lag - 360.0 * np.round((slowest - _FIRST_LAG) / 360.0)
+        return found
+    at, other = (values[np.isfinite(before[1])] for values in before)
+    rising = np.argsort(at)
+    for stretch in np.split(known, np.flatnonzero(np.diff(known) > 1) + 1):
+        apart = lag[stretch] - np.interp(speed[stretch], at[rising], other[rising])
+        lag[stretch] -= 360.0 * np.round(np.median(apart) / 360.0)
     return lag
 
 
-def _first(values: NDArray[np.float64]) -> float:
-    return float(values[np.isfinite(values)][0])
-
-
-def _unwrap(phase: NDArray[np.float64]) -> NDArray[np.float64]:
+def _unwrap(phase: Floats) -> Floats:
     """Unwrap a phase (rad) over the values that there are: a diverged case has none."""
     found = phase.copy()
     finite = np.isfinite(phase)
@@ -108,7 +120,7 @@ def _unwrap(phase: NDArray[np.float64]) -> NDArray[np.float64]:
     return found
 
 
-def _without_jumps(phase: NDArray[np.float64]) -> NDArray[np.float64]:
+def _without_jumps(phase: Floats) -> Floats:
     """A phase (n_revolution,), rad, with NaN around its jumps."""
     step = np.angle(np.exp(1j * np.diff(phase)))
     jumps = (np.abs(step) > JUMP).astype(float)
@@ -116,7 +128,7 @@ def _without_jumps(phase: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(near > 0.5, np.nan, phase)
 
 
-def _mean(values: NDArray[np.float64]) -> float:
+def _mean(values: Floats) -> float:
     finite = values[np.isfinite(values)]
     return float(finite.mean()) if finite.size else 0.0
 

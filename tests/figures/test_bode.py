@@ -8,7 +8,7 @@ import synthetic_store
 import xarray as xr
 
 from postproc.figures.bode import bode, peaks_of
-from postproc.signals.orders import order_over_speed
+from postproc.signals.orders import order_over_speed, written_lag
 from rubhpc.errors import InputError
 
 N = 32  # samples a revolution
@@ -122,3 +122,18 @@ def test_a_bode_plot_names_the_peaks_of_1x():
     axes = bode(data.assign_coords(speed=speed)).show()
     assert [text.get_text() for text in axes[0].texts] == ["955 rpm, AF 9.93"]
     assert not bode(data.assign_coords(speed=speed), order=2.0).show()[0].texts
+
+
+def test_stretches_of_a_lag_lie_by_the_curve_drawn_before():
+    """Whole turns are unknown across a gap; a coast-down is drawn as the run-up that it repeats."""
+    speed = np.linspace(100.0, 200.0, 11)
+    lag = np.linspace(-130.0, 50.0, 11)
+    first = written_lag(-np.radians(lag), speed)
+    assert first == pytest.approx(lag + 360.0)
+    wound = lag + np.where(speed > 150.0, 720.0, 0.0)
+    wound[5] = np.nan
+    expected = np.where(np.isnan(wound), np.nan, first)
+    assert written_lag(-np.radians(wound), speed, (speed, first)) == pytest.approx(expected, nan_ok=True)
+    down = written_lag(-np.radians(lag[::-1]), speed[::-1])
+    assert down == pytest.approx(first[::-1])
+    assert np.isnan(written_lag(np.full(11, np.nan), speed, (speed, first))).all()
