@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, jit_part_sum
 from rubhpc.kernels.accumulators import observe_force
-from rubhpc.kernels.contact_modes import DYING, FORCED_LEVEL, RESOLVED, ModeTables, dot
+from rubhpc.kernels.contact_modes import DYING, RESOLVED, ModeTables, dot
 from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.event_search import longest_move, move_ticks
 from rubhpc.kernels.force_average import AVERAGING_TIME, BEGIN, COUNT, END, IMPULSE, OLDEST
@@ -26,6 +26,7 @@ Floats = NDArray[np.float64]
 
 # Of the averaging time: until that age of a contact, pieces may miss more of what lasts for a shorter time.
 SETTLED = 0.125
+FIRST = 1 / 32  # of the averaging time: length of the first piece after an event, if that follows the force
 
 
 @jit_inline_sum
@@ -81,14 +82,14 @@ def follow_force(
 ) -> None:
     """Add the force of closed pair i in span s between two ticks.
 
-    What an event sets off is fast at first: no piece is longer than the contact mode has lasted. From
-    `calm_from` to `calm_to` pieces are long.
+    What an event sets off is fast at first: no piece but the first is longer than the contact mode has
+    lasted. From `calm_from` to `calm_to` pieces are long.
     """
     spans = recorder.spans
     at, ahead, begin = spans.path[2], spans.path[3], spans.tick[s, 0]
     copy_coordinates(spans.begun[s], at)
     copy_coordinates(at, ahead)
-    passed = begin
+    passed, first = begin, int(FIRST * AVERAGING_TIME / clock.tick) + 1
     while passed < now:  # in few moves: spans are longer than the exponentials reach
         count = min(longest_move(tables), now - passed)
         move_ticks(tables, bodies, mode, count, clock.tick, at, ahead)
@@ -98,11 +99,10 @@ def follow_force(
     share = 0.5 / bodies.static[i] if is_stuck else 1.0
     before = force_at(tables, mode, i, share, is_stuck, at)
     while now < stop:
-        longest = 1 << FORCED_LEVEL
         if calm_from <= now < calm_to:
             longest = min(calm_to - now, longest_move(tables))
-        elif now > begin:
-            age = now - begin
+        else:
+            age = max(now - begin, first)
             resolved = resolved_force(tables, mode, i, age * clock.tick, at) / clock.tick
             longest = 1 << floor_log2(int(max(1.0, min(resolved, 1.0 * age, 1.0 * (stop - now)))))
         count = min(longest, stop - now)

@@ -166,8 +166,9 @@ class FrictionMarch(EventDrivenMarch):
         both = growing, self.exponents(wanted)
         self._met.tabulate(left, self._tables_of(wanted), both, self.bodies, self._friction)
         for before, after in self._met.nearly_due():  # each would end a kernel call
-            self.find(before)
-            self.find(after)
+            for mask in (before, after):
+                if mask not in self.tables.mask:
+                    self.find(mask)
             modes = self._tables_of(before), self._tables_of(after)
             both = self.exponents(before), self.exponents(after)
             self._met.tabulate(*modes, both, self.bodies, self._friction)
