@@ -73,7 +73,12 @@ class Passing:
             self._check()
         try:
             march = self._begin(setup, n_sample, begun, goes_on=goes_on)
-            return self._pass(march, setup, n_sample, earlier, is_balanced)
+            passed = self._pass(march, setup, n_sample, earlier, is_balanced)
+            if isinstance(march, EventDrivenMarch):
+                lasts, closed = setup.interval * n_sample, march.closed(march.mask)
+                if march.has_lost_events(passed.n_step, lasts, march.motion(), closed):
+                    raise NoClosedForm
+            return passed
         except NoClosedForm:  # chattering contacts: short steps need no events
             self._march = None
             even = evenly_forced(setup, n_sample)

@@ -112,6 +112,7 @@ def take_stretch(
     sums = stacked_accumulators(1 + n_piece * n_part, earlier[0])
     for field, value in zip(sums, earlier[0], strict=True):
         field[first * n_part] = value
+    seen = march.seen()
     while True:
         outcome = march.advance_through(pieces, samples, sums)
         if outcome not in (MODE_WANTED, PAUSED):
@@ -127,7 +128,16 @@ def take_stretch(
             pieces = pieces._replace(table=library.tuned(march.met))
     end = int(pieces.at[PIECE])
     assert end == n_piece or outcome != FINISHED
-    if end == first:
+    has_lost = any(
+        march.has_lost_events(
+            int(pieces.n_step[i]), float(lasts[i]), pieces.motion[i + 1], pieces.pressing[i + 1] > 0.0
+        )
+        for i in range(first, end)
+    )
+    if has_lost:  # each is integrated alone
+        pieces.seen[:] = seen
+        march.step_back(pieces)
+    if end == first or has_lost:
         return None
     parts = slice(1 + first * n_part, 1 + end * n_part)
     return Stretch(

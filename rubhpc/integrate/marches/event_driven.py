@@ -41,6 +41,10 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
+LOST, LEAST = 100.0, 1e-10  # of the overlap that is allowed; m
+MOST_STEPS = 20.0  # of a piece, over those of short steps: with more, its events have no end
+
+
 class EventDrivenMarch(ContactSets):
     """A case that goes from one contact mode to another; `NoClosedForm` leaves it to contact stepping."""
 
@@ -85,6 +89,19 @@ class EventDrivenMarch(ContactSets):
     def reached_in(self) -> tuple[int, Floats]:
         """Set of contacts in which the case stands, and a copy of its modal coordinates (2, m)."""
         return self.moved_by(self.mask), self._z.copy()
+
+    def has_lost_events(self, n_step: int, lasts: float, motion: Floats, closed: NDArray[np.bool_]) -> bool:
+        """Whether a piece of a duration (s) took far more steps than short ones, or missed an event.
+
+        Then a pair that is not `closed` (q,) overlaps at its end by far more than an event leaves.
+        """
+        bodies, q = self.bodies, self._clearance.size
+        if bodies.spring or not self.has_closed_form:
+            return False
+        gap = bodies.clearance[:q] + bodies.gap_jacobian @ motion[: motion.size // 2]
+        deepest = float(gap[~closed].min(initial=0.0))
+        is_endless = n_step > MOST_STEPS * lasts / self._setup.contact_step
+        return is_endless or deepest < -LOST * max(bodies.overlap, LEAST)
 
     def keep_fast(self, before: tuple[int, Floats], spin: float, since: float) -> None:
         """Let fast modes go on as they were before a piece began at another speed, in the same contacts.
@@ -154,6 +171,10 @@ class EventDrivenMarch(ContactSets):
         if outcome not in (FINISHED, MODE_WANTED, PAUSED):
             self.step_back(pieces)
         return outcome
+
+    def seen(self) -> Floats:
+        """A copy of the signals at the last sample, with their rates (`Recorder.last`)."""
+        return self._recorder.last.copy()
 
     def step_back(self, pieces: Pieces) -> None:
         """Forget what was seen of the piece under way."""
