@@ -36,6 +36,20 @@ def solve_active(
                     m += 1
             work[n, q] = -gap[i]
             n += 1
+    if not solve_rows(work, n):
+        return False
+    n = 0
+    for i in range(q):
+        if active[i]:
+            force[i] = work[n, q]
+            n += 1
+    return True
+
+
+@jit_lean
+def solve_rows(work: Floats, n: int) -> bool:
+    """Solve n linear equations in place, right-hand sides in the last column; False where singular."""
+    q = work.shape[1] - 1
     for k in range(n):
         pivot = k
         for i in range(k + 1, n):
@@ -57,11 +71,6 @@ def solve_active(
         for j in range(k + 1, n):
             total -= work[k, j] * work[j, q]
         work[k, q] = total / work[k, k]
-    n = 0
-    for i in range(q):
-        if active[i]:
-            force[i] = work[n, q]
-            n += 1
     return True
 
 

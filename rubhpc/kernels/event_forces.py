@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline, jit_inline_sum, jit_lean
-from rubhpc.kernels.complementarity import UNSOLVED, solve_active
+from rubhpc.kernels.complementarity import UNSOLVED, solve_rows
 from rubhpc.kernels.contact_pairs import Workspace  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.coulomb_friction import ROUNDING, UNNOTICED, solve_cones
 from rubhpc.kernels.earlier_spans import EarlierSpans, no_earlier_spans
@@ -39,10 +39,9 @@ class FrictionWork(NamedTuple):
     ]  # (2, 2 q), what is known of the switch functions: `event_bounds.free_until`
     earlier: EarlierSpans  # with which spans are compared
     impulse: Floats  # (q,), accumulated before the event, N s
-    rest: Floats  # (2 q, 2 q), rates of the gaps, then slips, by impulses along them, 1/kg
-    rest_speed: Floats  # (2 q,), m/s
-    rest_impulse: Floats  # (2 q,), N s
+    rest_speed: Floats  # (2 q,), rates of the gaps, then slips, m/s
     is_at_rest: NDArray[np.bool_]  # (2 q,)
+    held: NDArray[np.int64]  # (2 q,), places of those at rest
     elimination: Floats  # (2 q, 2 q + 1)
     trail: Trail  # of the motion
 
@@ -59,10 +58,9 @@ def friction_work(solver: Workspace, q: int, n: int) -> FrictionWork:
         free_until=np.zeros((2, 2 * q), dtype=np.int64),
         earlier=no_earlier_spans(),
         impulse=np.zeros(q),
-        rest=np.zeros((2 * q, 2 * q)),
         rest_speed=np.zeros(2 * q),
-        rest_impulse=np.zeros(2 * q),
         is_at_rest=np.zeros(2 * q, dtype=np.bool_),
+        held=np.zeros(2 * q, dtype=np.int64),
         elimination=np.zeros((2 * q, 2 * q + 1)),
         trail=no_trail(),
     )
@@ -145,41 +143,77 @@ def expected_states(states: int, crossing: int, work: FrictionWork) -> int:
 def solve_expected(
     bodies: FrictionBodies, states: int, crossing: int, work: FrictionWork, feeds_none: bool
 ) -> int:
-    """As `solve_event`, at the event of switch functions `crossing`; one pivot where it goes as expected."""
+    """As `solve_event`, at the event of switch functions `crossing`; a solution where it goes as expected.
+
+    A pair that would hold more than its friction may slides in a second solution.
+    """
     expected = expected_states(states, crossing, work)
-    if solve_states(bodies, expected, work) and obeys_laws(bodies, expected, work, feeds_none):
-        return 1
+    for tried in range(1, 3):
+        if not solve_states(bodies, expected, work):
+            break
+        if obeys_laws(bodies, expected, work, feeds_none):
+            return tried
+        following = sliding_instead(bodies, expected, work)
+        if following == expected:
+            break
+        expected = following
     return int(solve_event(bodies, work, feeds_none))
 
 
 @jit_inline_sum
-def fill_response(bodies: FrictionBodies, states: int, work: FrictionWork) -> None:
-    """Fill `work.rest`: what normal forces, with the friction of pairs that slide, and tractions change."""
-    solver, q = work.solver, work.rate.size
-    for j in range(q):
-        state, rubs = state_of(states, j), 0.0
-        if state in (FORWARD, BACKWARD):
-            rubs = bodies.sliding[j] if state == FORWARD else -bodies.sliding[j]
-        for i in range(q):
-            work.rest[i, j] = solver.matrix[i, j] + rubs * solver.coupling[i, j]
-            work.rest[q + i, j] = solver.tangential[0, i, j] + rubs * solver.tangential[1, i, j]
-            work.rest[i, q + j], work.rest[q + i, q + j] = solver.coupling[i, j], solver.tangential[1, i, j]
+def sliding_instead(bodies: FrictionBodies, states: int, work: FrictionWork) -> int:
+    """States in which pairs slide that stick with more friction than their cones of `work.solver` allow.
+
+    Not where friction at rest is greater: once one slides, another one may hold.
+    """
+    solver, found = work.solver, states
+    for i in range(work.rate.size):
+        is_held = state_of(states, i) == STUCK and bodies.static[i] == bodies.sliding[i]
+        if is_held and abs(solver.traction[i]) > solver.cone[i] * solver.force[i]:
+            found ^= (STUCK ^ (FORWARD if solver.traction[i] > 0.0 else BACKWARD)) << (2 * i)
+    return found
 
 
 @jit_inline_sum
 def solve_active_pairs(bodies: FrictionBodies, states: int, work: FrictionWork) -> bool:
     """Forces of `work.solver` that stop `work.rest_speed` where `work.is_at_rest`; False where none do."""
-    solver, q = work.solver, work.rate.size
-    fill_response(bodies, states, work)
-    if not solve_active(work.rest, work.rest_speed, work.is_at_rest, work.rest_impulse, work.elimination):
+    solver, q, rows = work.solver, work.rate.size, work.elimination
+    n = int(np.int64(0))
+    for i in range(2 * q):
+        if work.is_at_rest[i]:
+            work.held[n] = i
+            n += 1
+    for row in range(n):
+        i = work.held[row]
+        by_force = solver.matrix[i] if i < q else solver.tangential[0, i - q]
+        by_traction = solver.coupling[i] if i < q else solver.tangential[1, i - q]
+        for column in range(n):
+            j = work.held[column]
+            if j < q:  # with the friction of a pair that slides
+                rows[row, column] = by_force[j] + rub_of(bodies, states, j) * by_traction[j]
+            else:
+                rows[row, column] = by_traction[j - q]
+        rows[row, 2 * q] = -work.rest_speed[i]
+    if not solve_rows(rows, n):
         return False
     for i in range(q):
-        state = state_of(states, i)
-        solver.force[i], solver.traction[i] = work.rest_impulse[i], work.rest_impulse[q + i]
-        if state in (FORWARD, BACKWARD):
-            sense = 1.0 if state == FORWARD else -1.0
-            solver.traction[i] = sense * bodies.sliding[i] * solver.force[i]
+        solver.force[i], solver.traction[i] = 0.0, 0.0
+    for row in range(n):
+        i = work.held[row]
+        if i < q:
+            solver.force[i] = rows[row, 2 * q]
+            solver.traction[i] = rub_of(bodies, states, i) * rows[row, 2 * q]
+        else:
+            solver.traction[i - q] = rows[row, 2 * q]
     return True
+
+
+@jit_inline_sum
+def rub_of(bodies: FrictionBodies, states: int, i: int) -> float:
+    """Traction of pair i for a unit normal force where it slides; 0 where it does not."""
+    state = state_of(states, i)
+    rubs = bodies.sliding[i] if state == FORWARD else 0.0
+    return -bodies.sliding[i] if state == BACKWARD else rubs
 
 
 @jit_inline_sum
@@ -203,7 +237,8 @@ def obeys_laws(bodies: FrictionBodies, states: int, work: FrictionWork, feeds_no
     for i in range(q):
         state = state_of(states, i)
         solver.active[i] = state != OPEN
-        solver.cone[i] = bodies.static[i] if solver.is_sticking[i] else bodies.sliding[i]
+        is_held = solver.is_sticking[i] and state == STUCK
+        solver.cone[i] = bodies.static[i] if is_held else bodies.sliding[i]
         if state != OPEN:
             force, traction, slip = solver.force[i], solver.traction[i], solver.slip[i]
             bound, end = solver.cone[i] * force, slip + slip_change(solver, i)

@@ -24,7 +24,7 @@ from rubhpc.kernels.event_steps import count_event, record_touch
 from rubhpc.kernels.friction_change import change_seen
 from rubhpc.kernels.friction_coordinates import begin_states, leave_states, used_width
 from rubhpc.kernels.friction_events import add_kick, see_pairs, takes_part
-from rubhpc.kernels.friction_spans import note_impulse
+from rubhpc.kernels.friction_spans import copy_coordinates, note_impulse
 from rubhpc.kernels.friction_states import OPEN, FrictionBodies, state_of
 from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.trail import note_after, note_event
@@ -139,7 +139,6 @@ def take_change(
         return MODE_WANTED if passed == UNKNOWN - WORTH_A_TABLE else UNDER_WAY
     pass_over(transitions, passed, m, z, z_next)
     add_impulses(transitions, following, q, m, work.given, z_next)
-    for k in range(m):
-        z[0, k], z[1, k] = z_next[0, k], z_next[1, k]
+    copy_coordinates(z_next, z)
     begin_states(tables, following, reduced.clearance, cosine, sine, progress, z)
     return UNDER_WAY

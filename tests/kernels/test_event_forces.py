@@ -13,13 +13,14 @@ NAMES = {
     lemke: ("exchange",),
     event_forces: (
         "expected_states",
-        "fill_response",
         "obeys_laws",
+        "rub_of",
+        "sliding_instead",
         "slip_change",
-        "solve_active",
         "solve_active_pairs",
         "solve_cones",
         "solve_event",
+        "solve_rows",
         "solve_states",
         "state_of",
     ),
@@ -79,6 +80,21 @@ def test_forces_that_are_expected_are_those_of_lemkes_method(feeds_none):
             np.array([work.solver.force, work.solver.traction]), rel=1e-9, abs=1e-12
         )
     assert 100 < n_expected < 390
+
+
+def test_a_pair_that_cannot_hold_slides_in_a_second_solution(monkeypatch):
+    random, n_second, by_lemke = np.random.default_rng(6), 0, event_forces.solve_event
+    monkeypatch.setattr(event_forces, "solve_event", lambda *given: event_forces.UNSOLVED)
+    for _ in range(400):
+        bodies, work, states, crossing = event(random, int(random.integers(1, 4)))
+        if plain(event_forces.solve_expected)(bodies, states, crossing, work, False) == 2:
+            n_second += 1
+            found = np.array([work.solver.force, work.solver.traction])
+            assert by_lemke(bodies, work, False) >= 0
+            assert found == pytest.approx(
+                np.array([work.solver.force, work.solver.traction]), rel=1e-9, abs=1e-12
+            )
+    assert n_second > 20
 
 
 def test_a_pair_without_a_finite_gap_is_expected_open():
