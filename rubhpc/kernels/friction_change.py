@@ -91,7 +91,7 @@ def change_seen(
     else:
         if not collide(reduced, bodies, states, crossing, is_recorded, work, accumulator):
             return -1
-        part_pairs(bodies, moment, cosine, sine, work)
+        part_pairs(reduced, bodies, moment, cosine, sine, work)
     pivots = solve_expected(bodies, states, crossing, work, False)
     if pivots == UNSOLVED:
         return -1

@@ -26,7 +26,7 @@ from rubhpc.kernels.event_forces import (
     solve_expected,
 )
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, FrictionBodies, state_of
-from rubhpc.kernels.mode_change import AT_REST, OPENING, least_flight, product
+from rubhpc.kernels.mode_change import AT_REST, OPENING, hidden_flight, least_flight, product
 
 Floats = NDArray[np.float64]
 
@@ -158,16 +158,18 @@ def rate_without_forces(
 
 
 @jit_inline_sum
-def part_pairs(bodies: FrictionBodies, moment: float, cosine: float, sine: float, work: FrictionWork) -> None:
+def part_pairs(
+    reduced: Reduced, bodies: FrictionBodies, moment: float, cosine: float, sine: float, work: FrictionWork
+) -> None:
     """Fill what the gaps and slips of rigid pairs do over a `moment` (s) without forces, m/s2.
 
     Those that part take no part in what goes on.
     """
-    solver, q = work.solver, work.rate.size
+    solver, q, hidden = work.solver, work.rate.size, hidden_flight(reduced)
     for i in range(q):
         if solver.gap[i] < np.inf:
             opening, rate = rate_without_forces(bodies, i, cosine, sine, work), work.rate[i]
-            time = least_flight(opening, moment)
+            time = least_flight(opening, moment, hidden)
             # A pair that parts so slowly that it is pressed together again at once has not parted.
             if rate <= OPENING + max(-opening, 0.0) * time:
                 solver.gap[i] = opening + (rate / time if abs(rate) > OPENING else 0.0)

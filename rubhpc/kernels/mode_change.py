@@ -23,17 +23,28 @@ OPENING = 1e-9  # m/s, above which a pair parts
 AT_REST = 1e-12  # m/s, of gaps that stay closed
 GAP_TOLERANCE = 1e-14  # m, of overlap, above which a gap has closed
 HIDDEN = 8.0 * GAP_TOLERANCE  # m, first speed squared over deceleration of a flight four tolerances high
+SUSTAINED = 0.08  # the same of bounces, over the overlap that followed modes may leave as a pair opens
 
 
 @jit_inline_sum
-def least_flight(acceleration: float, moment: float) -> float:
+def hidden_flight(reduced: Reduced) -> float:
+    """First speed squared over deceleration, m, of flights that are not resolved.
+
+    Modes that follow the speed err as each flight enters them, and would sustain bounces at that speed.
+    """
+    return max(HIDDEN, SUSTAINED * reduced.overlap) if reduced.restitution > 0.0 else HIDDEN
+
+
+@jit_inline_sum
+def least_flight(acceleration: float, moment: float, hidden: float) -> float:
     """Time (s) within which a pair that parts has to be pressed together to count as closed.
 
-    It is `moment` (s) or longer. A flight within the tolerance of gaps would end at a speed due to that, and
-    two pairs that throw each other open would never come to rest. The acceleration (m/s2) is the gap's.
+    It is `moment` (s) or longer, where flights are `hidden` (`hidden_flight`). A flight within the tolerance
+    of gaps would end at a speed due to that, and two pairs that throw each other open would never come to
+    rest. The acceleration (m/s2) is the gap's.
     """
     pressed = max(-acceleration, 0.0)
-    return float(np.sqrt(HIDDEN / pressed)) if 0.0 < pressed * moment * moment < HIDDEN else moment
+    return float(np.sqrt(hidden / pressed)) if 0.0 < pressed * moment * moment < hidden else moment
 
 
 @jit_inline_sum
@@ -70,6 +81,7 @@ def change_contacts(
     longer than `moment` (s), the accelerations decide. Fills the impulses `given` (q,), N s.
     """
     q, n = reduced.gap_jacobian.shape
+    hidden = hidden_flight(reduced)
     candidates = (closed & ~crossing) | (crossing & ~closed)
     velocity = motion[n:]
     for i in range(q):
@@ -103,7 +115,7 @@ def change_contacts(
                     - product(reduced.damping[k], velocity)
                 )
             # A pair that parts so slowly that it is pressed together again at once counts as closed.
-            time = least_flight(acceleration, moment)
+            time = least_flight(acceleration, moment, hidden)
             if product(reduced.gap_jacobian[i], velocity) <= OPENING + max(-acceleration, 0.0) * time:
                 speed[i] = acceleration
         active[i] = speed[i] < 0.0

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.kernels._jit import plain
-from rubhpc.kernels.mode_change import AT_REST, OPENING, least_flight
+from rubhpc.kernels.mode_change import AT_REST, HIDDEN, OPENING, least_flight
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -79,5 +79,5 @@ def _opening(case: PiecewiseMotion, piece: Piece, time: float) -> tuple[Floats, 
         - bodies.damping @ motion[n:]
     )
     opening = bodies.gap_jacobian @ free
-    flight = np.array([plain(least_flight)(pull, march.moment) for pull in opening.tolist()])
+    flight = np.array([plain(least_flight)(pull, march.moment, HIDDEN) for pull in opening.tolist()])
     return OPENING + np.maximum(-opening, 0.0) * flight - speed, opening
