@@ -6,6 +6,7 @@ import io
 import pickle
 import threading
 from collections import OrderedDict
+from dataclasses import is_dataclass
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 if TYPE_CHECKING:
@@ -22,6 +23,7 @@ class _Made(threading.local):
 
     def __init__(self) -> None:
         self.by_content: OrderedDict[bytes, object] = OrderedDict()
+        self.written: OrderedDict[int, tuple[object, bytes]] = OrderedDict()  # by identity, of what is fixed
 
 
 _made = _Made()
@@ -48,18 +50,47 @@ def recent(make: Callable[[], T], *content: object) -> T:
         Compared by value, arrays included, and not kept. Of what cannot be written as bytes, or has a class
         that is not the package's, it is made each time.
     """
-    written = io.BytesIO()
     try:
-        _Content(written).dump(content)
+        key, known = _written(tuple(_short(item) for item in content)), _made.by_content
     except (pickle.PicklingError, TypeError, AttributeError):
         return make()
-    key, known = written.getvalue(), _made.by_content
     if key not in known:
         known[key] = make()
         if len(known) > KEPT:
             known.popitem(last=False)
     known.move_to_end(key)
     return cast("T", known[key])
+
+
+def _written(content: object) -> bytes:
+    """Content as bytes."""
+    written = io.BytesIO()
+    _Content(written).dump(content)
+    return written.getvalue()
+
+
+def _short(item: object) -> object:
+    """The bytes of a rig, which takes long to write; the same for any other content."""
+    if not is_dataclass(item):
+        return item
+    known = _made.written
+    if id(item) not in known:
+        if not _is_fixed(item):
+            return item
+        known[id(item)] = item, _written(item)
+        if len(known) > KEPT:
+            known.popitem(last=False)
+    return known[id(item)][1]
+
+
+def _is_fixed(item: object) -> bool:
+    """Whether an object cannot change: numbers, text, and frozen dataclasses and tuples of them."""
+    if isinstance(item, tuple):
+        return all(map(_is_fixed, item))
+    params = getattr(item, "__dataclass_params__", None)
+    if params is not None and params.frozen:
+        return all(map(_is_fixed, vars(item).values()))
+    return item is None or type(item) in (bool, int, float, str)
 
 
 def forget() -> None:

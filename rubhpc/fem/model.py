@@ -265,7 +265,7 @@ class Model:
         rows = (self.rotor.index(self.output_node, name) for name in ("v", "w", "thx"))
         return np.array([self.sag[row] if row >= 0 else 0.0 for row in rows])
 
-    @property
+    @cached_property
     def n_place(self) -> int:
         """Places whose motion is recorded besides the output node's.
 
@@ -273,7 +273,7 @@ class Model:
         """
         return len(self.stators) + len(self.carriers) + len(self.turning_carriers)
 
-    @property
+    @cached_property
     def turning_carriers(self) -> tuple[CarrierModel, ...]:
         """Carriers that are not held in rotation about the shaft's axis."""
         return tuple(carrier for carrier in self.carriers if carrier.body.index(1, "thx") >= 0)

@@ -158,7 +158,8 @@ def check_fields(owner: Any) -> None:
         problem = check_value(declared, value)
         if problem:
             raise FieldError(key_of(declared), problem)
-        if declared.metadata.get("kind") == "count" and isinstance(value, Integral):
+        kind = declared.metadata.get("kind")
+        if kind == "count" and type(value) is not int and isinstance(value, Integral):
             object.__setattr__(owner, declared.name, int(value))  # numpy's whole numbers
 
 

@@ -78,7 +78,7 @@ def _parse_count(value: object, limits: Limits, where: str) -> int | str:
 def _check_count(value: object, limits: Limits) -> str:
     if isinstance(value, str) and value in limits["or_words"]:
         return ""
-    if isinstance(value, bool) or not isinstance(value, Integral):
+    if type(value) is not int and (isinstance(value, bool) or not isinstance(value, Integral)):
         words = "".join(f', or "{word}"' for word in limits["or_words"])
         return f"{brief(value)} is not a whole number; give one such as 12{words}"
     if int(value) < limits["at_least"]:

@@ -117,7 +117,9 @@ def _note_peak_at_return(
 
 def _ends_within(accumulator: Accumulator, since: float) -> bool:
     """Whether a piece of any pair's force ends after a time, s, that the accumulator has followed."""
-    piece, held = accumulator.force_piece, accumulator.force_held
-    newest = (held[:, OLDEST] + held[:, COUNT] - 1) % piece.shape[2]
-    ends = piece[np.arange(len(piece)), END, newest]
-    return bool(np.any((held[:, COUNT] > 0) & (ends > accumulator.origin[0] + since)))
+    piece, time = accumulator.force_piece, accumulator.origin[0] + since
+    newest = [(held[OLDEST] + held[COUNT] - 1) % piece.shape[2] for held in accumulator.force_held.tolist()]
+    return any(
+        count > 0 and piece[i, END, k] > time
+        for i, (k, count) in enumerate(zip(newest, accumulator.force_held[:, COUNT], strict=True))
+    )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import Enum
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from rubhpc.schema import SCHEMES
@@ -20,7 +21,7 @@ class Scheme(Enum):
     CONTACT_STEPPING = "contact-stepping"  # closed-form motion between short steps of contact
     CENTRAL_DIFFERENCE = "central-difference"  # the paper's
 
-    @property
+    @cached_property
     def flag(self) -> int:
         """The scheme's number in a store."""
         return SCHEMES.index(self.value.replace("-", "_"))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.measuring.samples import empty_samples, new_accumulator
+from rubhpc.integrate.measuring.samples import empty_samples, new_accumulator, no_record
 from rubhpc.kernels.accumulators import HORIZONTAL, TWIST, VERTICAL
 
 if TYPE_CHECKING:
@@ -99,4 +99,4 @@ def pass_revolutions(
 
 def idle_of(march: March) -> tuple[Samples, Accumulator]:
     """Empty samples and an accumulator, which `pass_revolutions` does not change."""
-    return empty_samples(march.n_place, 0), new_accumulator(march.touching().size)
+    return no_record(march.n_place, march.touching().size)

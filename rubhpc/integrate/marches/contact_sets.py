@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from rubhpc.integrate.marches.modal import ModalMarch
-from rubhpc.integrate.measuring.samples import new_accumulator
+from rubhpc.integrate.measuring.samples import no_record
 from rubhpc.kernels.contact_modes import FORCED_LEVEL
 from rubhpc.kernels.mode_change import change_contacts
 
@@ -51,7 +51,7 @@ class ContactSets(ModalMarch):
 
     def closed(self, mask: int) -> NDArray[np.bool_]:
         """Whether each pair is closed in a contact mode, (q,)."""
-        return np.array([bool(mask >> i & 1) for i in range(self._clearance.size)])
+        return _are_set(mask, self._clearance.size)
 
     def opened(self, mask: int) -> NDArray[np.bool_]:
         """Whether each pair is open in a contact mode, with its gap monitored, (q,)."""
@@ -69,8 +69,11 @@ class ContactSets(ModalMarch):
 
     def forces(self, mode: int, z: Floats) -> Floats:
         """Forces (q,), N, at coordinates (2, m) of a contact mode, given by its index in the tables."""
+        is_closed = self.closed(int(self.tables.mask[mode]))
+        if not is_closed.any():
+            return np.zeros(is_closed.size)
         force = self.tables.switch_re[mode] @ z[0] - self.tables.switch_im[mode] @ z[1]
-        return np.where(self.closed(int(self.tables.mask[mode])), force, 0.0)
+        return np.where(is_closed, force, 0.0)
 
     def exponents(self, mask: int) -> tuple[Floats, Floats]:
         """Exponents of the coordinates of a contact mode and their drift (`ModeLibrary.exponents`)."""
@@ -119,7 +122,15 @@ class ContactSets(ModalMarch):
         room = np.zeros(q), np.zeros(q), np.zeros(q, dtype=np.bool_), np.zeros((q, q + 1))
         return *room, self._unrecorded
 
-    @cached_property
+    @property
     def _unrecorded(self) -> Accumulator:
         """Accumulator for events that are not recorded."""
-        return new_accumulator(self._clearance.size)
+        return no_record(self.n_place, self._clearance.size)[1]
+
+
+@lru_cache
+def _are_set(mask: int, q: int) -> NDArray[np.bool_]:
+    """Whether each of the lowest bits is set, (q,)."""
+    found = np.array([bool(mask >> i & 1) for i in range(q)])
+    found.flags.writeable = False
+    return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -36,8 +37,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-_NEW = new_progress(1)
-_BEGUN = bare(_NEW)
+_BEGUN = bare(new_progress(1))
 
 
 class Place(NamedTuple):
@@ -52,6 +52,7 @@ class ModalMarch(March):
     """A case in modal coordinates z (2, m), real and imaginary, of its present contact mode."""
 
     tables: ModeTables
+    _z: Floats = np.zeros((2, 0))
 
     def __init__(
         self,
@@ -68,13 +69,17 @@ class ModalMarch(March):
         self._model: Model | None = None  # of the clearances
         self._bodies_of: ModalSetup | None = None  # of the bodies
         self._ended: Floats | None = None  # motion at the end of the last call
-        records = _NEW.copy()
-        self.progress: Progress = records[0]
-        self._bare_records = bare(records)
-        self._bare_progress = self._bare_records[0]  # the same, for kernels
+        self._bare_records = _BEGUN.copy()
+        self._bare_progress = self._bare_records[0]
         self._take(setup)
         self._motion = self.reduced(initial)
         self._recorder = recorder(setup.model.n_place, setup.model.n_probe)
+
+    @cached_property
+    def progress(self) -> Progress:
+        """Progress of the case, with items as attributes."""
+        found: Progress = self._bare_records.view(np.recarray)[0]
+        return found
 
     @property
     def setup(self) -> ModalSetup:
@@ -158,8 +163,8 @@ class ModalMarch(March):
         """Take tables, and coordinates of their width."""
         self.tables = tables
         m = tables.switch_re.shape[2]
-        self._z: Floats = aligned((2, m))
-        self._z_next: Floats = aligned((2, m))
+        if self._z.shape[1] != m:
+            self._z, self._z_next = aligned((2, m)), aligned((2, m))
 
     def _start(self, mode: int) -> None:
         """Begin in a contact mode of the tables, at the shaft's angle 0."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -70,8 +71,16 @@ def whirl_ratio(vertical: Floats, horizontal: Floats, samples_per_revolution: in
     """
     cycle = [signal.reshape(-1, samples_per_revolution).mean(axis=0) for signal in (vertical, horizontal)]
     whirl = cycle[0] + 1j * cycle[1]
-    turn = np.exp(2j * np.pi * np.arange(samples_per_revolution) / samples_per_revolution)
+    turn = _turn(samples_per_revolution)
     forward, backward = float(abs(np.vdot(turn, whirl))), float(abs(turn @ whirl))
     if forward + backward == 0.0:
         return math.nan
     return math.copysign(1.0, spin) * (forward - backward) / (forward + backward)
+
+
+@cache
+def _turn(n: int) -> NDArray[np.complex128]:
+    """Points (n,) of a unit circle."""
+    found: NDArray[np.complex128] = np.exp(2j * np.pi * np.arange(n) / n)
+    found.flags.writeable = False
+    return found

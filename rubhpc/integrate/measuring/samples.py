@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -55,6 +56,12 @@ def new_accumulator(n_stator: int, n_place: int | None = None) -> Accumulator:
         force_held=np.zeros((n_stator, 2), dtype=np.int64),
         origin=np.zeros(1),
     )
+
+
+@cache
+def no_record(n_place: int, n_stator: int) -> tuple[Samples, Accumulator]:
+    """Empty samples and an accumulator for what is not recorded: kernels do not change them."""
+    return empty_samples(n_place, 0), new_accumulator(n_stator)
 
 
 def following_accumulator(before: Accumulator, passed: float) -> Accumulator:

@@ -84,13 +84,6 @@ class Approach:
         return cls(monodromy, piecewise.energy, scale)
 
     @cached_property
-    def _form(self) -> Floats:
-        """P, (2 n, 2 n)."""
-        form: Floats = self.theory.reading.T @ (self.theory.sums @ self.theory.reading)
-        form.flat[:: len(form) + 1] += self._energy
-        return form
-
-    @cached_property
     def multiplier(self) -> complex:
         """The largest; of a pair either."""
         if self.theory.onward.size == 0:
@@ -101,11 +94,14 @@ class Approach:
 
     def square(self, apart: Floats) -> float:
         """Square of the distance (2 n,)."""
-        return float(apart @ self._form @ apart)
+        read = self.theory.reading @ apart
+        return float(apart**2 @ self._energy + read @ self.theory.sums @ read)
 
     def squares(self, apart: Floats) -> list[float]:
         """Squares of k distances (k, 2 n)."""
-        found: list[float] = np.einsum("ki,ki->k", apart @ self._form, apart).tolist()
+        read = apart @ self.theory.reading.T
+        later = ((read @ self.theory.sums) * read).sum(axis=1)
+        found: list[float] = (apart**2 @ self._energy + later).tolist()
         return found
 
     def obeys(self, before: Floats, after: Floats, n_period: int) -> bool:
@@ -116,8 +112,7 @@ class Approach:
         predicted = before
         for _ in range(n_period):
             predicted = self.monodromy @ predicted
-        three = np.array([before, after, predicted, after - predicted])
-        begun, ended, expected, strays = np.einsum("ki,ij,kj->k", three, self._form, three)
+        begun, ended, expected, strays = self.squares(np.array([before, after, predicted, after - predicted]))
         return bool(strays <= LINEAR**2 * begun and begun - ended >= SHARE * (begun - expected))
 
 

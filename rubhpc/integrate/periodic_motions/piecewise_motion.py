@@ -20,8 +20,6 @@ from rubhpc.integrate.periodic_motions.revolution import (
     longer,
     whole_revolutions,
 )
-from rubhpc.kernels._jit import plain
-from rubhpc.kernels.case_progress import closed_pairs
 from rubhpc.kernels.flow import piece_room
 from rubhpc.kernels.friction_states import STUCK, state_of
 from rubhpc.kernels.revolutions import (
@@ -112,8 +110,7 @@ class PiecewiseMotion:
         clock = self.march.clock
         self.highest = self._tables.power_re.shape[1] - 1
         self.longest = min(self.highest, int(math.log2(self.turn / STEPS_PER_REVOLUTION / clock.tick)))
-        self.start = self.march.motion_of(*self.march.place())
-        self.states = plain(closed_pairs)(self.march.progress, self._tables)
+        self.start, self.states = self.march.motion(), self.march.mask
 
     def size(self, motion: Floats) -> float:
         """Root of v'v + spin^2 u'u of a reduced motion (2 n,), in which the mass matrix is the identity."""
