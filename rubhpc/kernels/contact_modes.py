@@ -191,6 +191,19 @@ def enter(
     )
 
 
+@jit_part_sum
+def go_on_in(tables: ModeTables, mode: int, motion: Floats, z: Floats, change: Floats) -> None:
+    """Add to coordinates `z` (2, m) what an event without another contact mode makes of the motion (2 n,).
+
+    Modes that follow the speed err as they are entered: entered again and again, the motion would be carried
+    away. `change` (2 n,) is work space.
+    """
+    for k in range(motion.size):
+        change[k] = motion[k] - dot(tables.motion_re[mode, k], tables.motion_im[mode, k], z[0], z[1])
+    add_rows(tables.enter_re[mode], change, z[0])
+    add_rows(tables.enter_im[mode], change, z[1])
+
+
 @jit_lean_sum
 def find_mode(mask: Ints, wanted: int) -> int:
     """Index of the mode with the wanted set of closed pairs; -1 where it is not tabulated yet."""

@@ -122,7 +122,17 @@ def advance(
     while True:
         if progress.wanted >= 0 or not is_begun:
             if not begin_mode(
-                tables, reduced, clock, is_recorded, progress, z, z_next, motion, recorder, work.trail
+                tables,
+                reduced,
+                clock,
+                is_recorded,
+                progress,
+                z,
+                z_next,
+                motion,
+                recorder,
+                work.trail,
+                is_begun,
             ):
                 return MODE_WANTED
             is_begun = True
@@ -245,13 +255,14 @@ def begin_mode(
     motion: Floats,
     recorder: Recorder,
     trail: Trail,
+    is_begun: bool,
 ) -> bool:
     """Enter the contact mode wanted, if any, with the reduced motion (2 n,), and begin to measure it.
 
-    Returns False where the mode is not tabulated.
+    Returns False where the mode is not tabulated. `is_begun`: the motion was in one of these tables before.
     """
     is_entered = progress.wanted < 0
-    if not is_entered and enter_wanted(tables, reduced.clearance, clock, progress, motion, z):
+    if not is_entered and enter_wanted(tables, reduced, clock, progress, motion, z, z_next, is_begun):
         is_entered = True
         note_piece(trail, tables.mask[progress.mode], z)
     if is_entered and is_recorded:

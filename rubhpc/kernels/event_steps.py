@@ -18,10 +18,12 @@ from rubhpc.kernels.contact_modes import (
     dot,
     enter,
     find_mode,
+    go_on_in,
     is_beyond,
 )
 from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.measuring import end_span
+from rubhpc.kernels.mode_change import GAP_TOLERANCE
 from rubhpc.kernels.sampling import Recorder, take_samples
 
 if TYPE_CHECKING:
@@ -32,14 +34,27 @@ Floats = NDArray[np.float64]
 
 @jit_part_sum
 def enter_wanted(
-    tables: ModeTables, clearance: Floats, clock: Clock, progress: Progress, motion: Floats, z: Floats
+    tables: ModeTables,
+    reduced: Reduced,
+    clock: Clock,
+    progress: Progress,
+    motion: Floats,
+    z: Floats,
+    z_next: Floats,
+    is_begun: bool,
 ) -> bool:
-    """Enter the contact mode wanted with the reduced motion (2 n,); False where the mode is not tabulated."""
+    """Enter the contact mode wanted with the reduced motion (2 n,); False where the mode is not tabulated.
+
+    `is_begun`: the motion was in one of these tables before. `z_next` (2, m) is work space.
+    """
     found = find_mode(tables.mask, progress.wanted)
     if found < 0:
         return False
-    cosine, sine = shaft_turn(clock, progress.tick)
-    enter(tables, found, clearance, cosine, sine, motion, z)
+    if is_begun and found == progress.mode and reduced.overlap > GAP_TOLERANCE:
+        go_on_in(tables, found, motion, z, z_next.reshape(z_next.size)[: motion.size])
+    else:
+        cosine, sine = shaft_turn(clock, progress.tick)
+        enter(tables, found, reduced.clearance, cosine, sine, motion, z)
     progress.mode, progress.wanted, progress.entered = found, NONE, progress.tick
     progress.contact_age, progress.halving_level, progress.is_after_event = NONE, NONE, 1
     return True

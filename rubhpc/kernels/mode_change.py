@@ -23,16 +23,17 @@ OPENING = 1e-9  # m/s, above which a pair parts
 AT_REST = 1e-12  # m/s, of gaps that stay closed
 GAP_TOLERANCE = 1e-14  # m, of overlap, above which a gap has closed
 HIDDEN = 8.0 * GAP_TOLERANCE  # m, first speed squared over deceleration of a flight four tolerances high
-SUSTAINED = 0.08  # the same of bounces, over the overlap that followed modes may leave as a pair opens
+SUSTAINED = 0.08  # the same over the overlap that followed modes may leave as a pair opens
 
 
 @jit_inline_sum
 def hidden_flight(reduced: Reduced) -> float:
     """First speed squared over deceleration, m, of flights that are not resolved.
 
-    Modes that follow the speed err as each flight enters them, and would sustain bounces at that speed.
+    Modes that follow the speed err as each flight enters them: bounces, and two pairs that throw each other
+    open, would go on at the speed that this brings.
     """
-    return max(HIDDEN, SUSTAINED * reduced.overlap) if reduced.restitution > 0.0 else HIDDEN
+    return max(HIDDEN, SUSTAINED * reduced.overlap)
 
 
 @jit_inline_sum

@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 UNKNOWN = -1  # place of what is not tabulated
-WORTH_A_TABLE = 64  # passages after which a transition is tabulated
+WORTH_A_TABLE = 32  # passages after which a transition is tabulated
 LANES = 8  # columns of a block are filled up to whole vectors
 SEEN = 4  # rows of a pair: rate of the gap, slip, and what changes them (`FrictionWork.drawn`)
 DECAYED = 1e-60  # coordinates of less are taken for nothing

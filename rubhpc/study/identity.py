@@ -26,7 +26,7 @@ PHYSICS = 25  # version of the physics: raised whenever a study gives other resu
 MODAL = 8  # method = "modal": modes kept, resolution of events, and last bits of multipliers and exponents
 DIRECT = 10  # transient = "direct"
 CHANGING_SPEED = 36  # run-ups and drives
-COULOMB = 26  # set-valued friction
+COULOMB = 27  # set-valued friction
 PENALTY = 1  # method = "modal" with a penalty, for whose sake modes are kept
 SOFT_FRICTION = 1  # a penalty with set-valued friction
 CURVED = 10  # method = "modal" with gaps that are curved

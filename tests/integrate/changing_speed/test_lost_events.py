@@ -1,12 +1,15 @@
-"""Pieces of a run-up that have missed an event, or whose events have no end, are taken in short steps."""
+"""Events of run-ups: contacts that share the shaft come to rest; missed events are taken in short steps."""
 
 import numpy as np
 import pytest
 
-from rubhpc import read_rig
+from rubhpc import LumpedStator, Rig, Unbalance, read_rig, run_up
+from rubhpc.integrate.changing_speed import passing
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.record import State
 from rubhpc.integrate.setup import prepare
+from rubhpc.rig.parts import Bearing, Damping, Disc, ShaftSection, Torsion
+from rubhpc.rig.rotors import Rotor
 from rubhpc.study.study import Contact, Integrator
 
 
@@ -24,3 +27,46 @@ def test_an_open_pair_that_overlaps_has_missed_an_event(overlap):
     assert march.has_lost_events(100, lasts, motion, is_open) == (overlap > 0.0)
     assert not march.has_lost_events(100, lasts, motion, is_closed)
     assert march.has_lost_events(int(21 * lasts / setup.contact_step), lasts, motion, is_closed)
+
+
+def test_two_masses_that_carry_a_shaft_come_to_rest_as_the_speed_falls(monkeypatch):
+    """No piece needs short steps; two masses threw each other open for ever, and one was lost."""
+    pump = Rotor(
+        shaft=(
+            ShaftSection(
+                length=0.5,
+                outer_diameter=0.03,
+                elements=5,
+                youngs_modulus=2.1e11,
+                shear_modulus=8e10,
+                density=7850.0,
+            ),
+        ),
+        disc=(Disc(node=6, diameter=0.18, thickness=0.03, density=7850.0),),
+        bearing=(
+            Bearing(node=1, kyy=2e7, kzz=2e7, cyy=400.0, czz=400.0),
+            Bearing(node=4, kyy=2e7, kzz=1e7, kyz=2e6, kzy=-2e6, cyy=900.0, czz=700.0),
+        ),
+        unbalance=(Unbalance(node=6, mass=0.01, radius=0.03, phase=1.0),),
+        torsion=Torsion(fixed_node=1),
+        damping=Damping(alpha=10.0, beta=1e-5),
+        gravity=9.81,
+    )
+    ring = tuple(
+        LumpedStator(
+            node=6, angle=np.deg2rad(11.5 + 45.0 * k), radius=0.09, mass=0.3, stiffness=1e6, damping=300.0
+        )
+        for k in range(8)
+    )
+    stepped = []
+    short = passing.ContactSteppingMarch
+    monkeypatch.setattr(passing, "ContactSteppingMarch", lambda *given: stepped.append(1) or short(*given))
+    found = run_up(
+        Rig(name="pump", rotor=pump, stator=ring),
+        speed_law=[(0.0, "2500 rpm"), (3.0, "5500 rpm"), (4.0, "5500 rpm"), (7.0, "2500 rpm")],
+        clearance="150 um",
+        friction=0.1,
+        samples_per_revolution=128,
+    )
+    assert not stepped
+    assert np.hypot(found.vertical, found.horizontal).max() == pytest.approx(377.6e-6, rel=1e-3)
