@@ -7,6 +7,7 @@ import pytest
 
 from rubhpc import simulate
 from rubhpc.errors import InputError
+from rubhpc.integrate.measuring.samples import new_accumulator, no_record
 from rubhpc.integrate.periodic_motions import direct
 from rubhpc.integrate.periodic_motions.direct import draws_near
 from rubhpc.integrate.periodic_motions.known_motions import Approach
@@ -317,3 +318,25 @@ def test_another_contact_ahead_is_seen():
         "samples_per_revolution": 64, "revolutions": 6, "keep": (),
     }  # fmt: skip
     assert simulate("mokhtar2017", transient="direct", transient_limit=3000, **case).period == 3
+
+
+LAWS = [
+    {},
+    {"restitution": 0.5},
+    {"law": "penalty", "stiffness": "1 MN/m"},
+    {"friction_law": "coulomb"},
+    {"friction_law": "coulomb", "law": "penalty", "stiffness": "1 MN/m"},
+    {"friction_law": "stribeck", "static_friction_ratio": 1.5, "stribeck_speed": 0.1},
+    {"normal": "updated"},
+    {"method": "central-difference"},
+]
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("transient", [12, "auto", "direct"])
+def test_what_is_not_recorded_leaves_the_shared_accumulator_as_it_is(law, transient):
+    limit = {"transient_limit": 40} if isinstance(transient, str) else {}
+    case = {"speed_ratio": 0.75, "clearance_ratio": 0.6, "transient": transient, "revolutions": 2}
+    simulate("mokhtar2017", **case, **limit, **law)
+    for shared, new in zip(no_record(1, 1)[1], new_accumulator(1), strict=True):
+        np.testing.assert_array_equal(shared, new)
