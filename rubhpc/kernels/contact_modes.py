@@ -191,17 +191,24 @@ def enter(
     )
 
 
-@jit_part_sum
-def go_on_in(tables: ModeTables, mode: int, motion: Floats, z: Floats, change: Floats) -> None:
+@jit_lean_sum
+def add_change(
+    motion_re: Floats,
+    motion_im: Floats,
+    enter_re: Floats,
+    enter_im: Floats,
+    motion: Floats,
+    z: Floats,
+) -> None:
     """Add to coordinates `z` (2, m) what an event without another contact mode makes of the motion (2 n,).
 
     Modes that follow the speed err as they are entered: entered again and again, the motion would be carried
-    away. `change` (2 n,) is work space.
+    away. The first arguments are rows of the mode's tables; the motion is overwritten with its change.
     """
     for k in range(motion.size):
-        change[k] = motion[k] - dot(tables.motion_re[mode, k], tables.motion_im[mode, k], z[0], z[1])
-    add_rows(tables.enter_re[mode], change, z[0])
-    add_rows(tables.enter_im[mode], change, z[1])
+        motion[k] -= dot(motion_re[k], motion_im[k], z[0], z[1])
+    add_rows(enter_re, motion, z[0])
+    add_rows(enter_im, motion, z[1])
 
 
 @jit_lean_sum

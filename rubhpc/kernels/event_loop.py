@@ -262,7 +262,7 @@ def begin_mode(
     Returns False where the mode is not tabulated. `is_begun`: the motion was in one of these tables before.
     """
     is_entered = progress.wanted < 0
-    if not is_entered and enter_wanted(tables, reduced, clock, progress, motion, z, z_next, is_begun):
+    if not is_entered and enter_wanted(tables, reduced, clock, progress, motion, z, is_begun):
         is_entered = True
         note_piece(trail, tables.mask[progress.mode], z)
     if is_entered and is_recorded:

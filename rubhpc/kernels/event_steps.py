@@ -15,10 +15,10 @@ from rubhpc.kernels.contact_modes import (
     SAMPLES_AT_ONCE,
     ModeTables,
     Reduced,
+    add_change,
     dot,
     enter,
     find_mode,
-    go_on_in,
     is_beyond,
 )
 from rubhpc.kernels.coordinate_steps import floor_log2
@@ -40,18 +40,24 @@ def enter_wanted(
     progress: Progress,
     motion: Floats,
     z: Floats,
-    z_next: Floats,
     is_begun: bool,
 ) -> bool:
     """Enter the contact mode wanted with the reduced motion (2 n,); False where the mode is not tabulated.
 
-    `is_begun`: the motion was in one of these tables before. `z_next` (2, m) is work space.
+    `is_begun`: the motion was in one of these tables before.
     """
     found = find_mode(tables.mask, progress.wanted)
     if found < 0:
         return False
     if is_begun and found == progress.mode and reduced.overlap > GAP_TOLERANCE:
-        go_on_in(tables, found, motion, z, z_next.reshape(z_next.size)[: motion.size])
+        add_change(
+            tables.motion_re[found],
+            tables.motion_im[found],
+            tables.enter_re[found],
+            tables.enter_im[found],
+            motion,
+            z,
+        )
     else:
         cosine, sine = shaft_turn(clock, progress.tick)
         enter(tables, found, reduced.clearance, cosine, sine, motion, z)

@@ -94,7 +94,7 @@ for path, module in list(sys.modules.items()):
 
 
 def test_a_first_case_compiles_no_more_than_it_did(tmp_path):
-    """Its kernels, one signature each, and their instructions: 44 000, of which a second makes 2000.
+    """Its kernels, one signature each, and their instructions: 46 700, of which a second makes 2000.
 
     On an empty cache: where some parts come from a cache, after an edit, there are a tenth more.
     """
@@ -106,4 +106,4 @@ def test_a_first_case_compiles_no_more_than_it_did(tmp_path):
     names, counts = zip(*compiled, strict=True)
     assert set(names) <= MAY_COMPILE
     assert len(names) == len(set(names))
-    assert 20_000 < sum(map(int, counts)) < 46_000
+    assert 20_000 < sum(map(int, counts)) < 47_500
