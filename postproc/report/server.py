@@ -121,6 +121,9 @@ class Server(ThreadingHTTPServer):
             raise InputError(f"--port: {problem}; give another, or leave it out") from error
         self.library = library
 
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Say nothing of a connection that breaks: a browser that is closed, or this server as it ends."""
+
     @property
     def port(self) -> int:
         """The port it listens on."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import http.client
 import signal
 import socket
+import struct
 import threading
 import zlib
 from typing import TYPE_CHECKING
@@ -97,6 +98,14 @@ def test_nothing_can_be_sent_to_it(server: Server) -> None:
 def test_a_port_in_use_is_said(server: Server, synthetic_path: Path) -> None:
     with pytest.raises(InputError, match=f"--port: {server.port} is not available"):
         Server(Library(lambda: open_store(synthetic_path)), server.port)
+
+
+def test_a_connection_that_breaks_is_passed_over(server: Server, capfd: pytest.CaptureFixture[str]) -> None:
+    with socket.create_connection(("127.0.0.1", server.port), timeout=60) as connection:
+        connection.sendall(b"GET / HTTP/1.1\r\n")
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # ends by a reset
+    assert ask(server, "/")[0] == 200
+    assert capfd.readouterr().err == ""
 
 
 def test_the_command_says_where_it_is_and_ends_on_interrupt(synthetic_path: Path) -> None:
