@@ -73,11 +73,18 @@ class CurvedTables(NamedTuple):
     accel_rate: Floats  # (p, q, d, q), 1/s, by a unit rate of h
     load_re: Floats  # (p, q, 4 + b, m), rates of the coordinates under unit loads
     load_im: Floats
+    exponent_re: Floats  # (p, m), 1/s
+    exponent_im: Floats
+    # Of steps of each length, filled as the first one is taken (`curved_levels`):
+    is_filled: NDArray[np.bool_]  # (p, n_level)
     node_re: Floats  # (p, n_level, 4, m), exponential of each coordinate up to the nodes after the first
     node_im: Floats
     weight_re: Floats  # (p, n_level, 4, 5, m), s, response at those nodes to loads at all of them
     weight_im: Floats
-    # Readings of a single pair at those nodes; no columns where there are more pairs.
+    # Readings of a single pair at those nodes, with what unit loads give of each coordinate; no columns where
+    # there are more pairs.
+    seen_re: Floats  # (p, 4 + b, 3 d + 1, m)
+    seen_im: Floats
     lone: Floats  # (p, n_level, 2, m, 4 (3 d + 1)), from real and imaginary parts at the beginning
     reach: Floats  # (p, n_level, 5 (4 + b), 4 (3 d + 1)), from the loads
     reached: Floats  # (p, n_level, 4 (3 d + 1), 4 (4 + b)), the same transposed, for the unknown loads

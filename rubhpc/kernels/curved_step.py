@@ -24,6 +24,7 @@ from rubhpc.kernels.curved_contact import (
 )
 from rubhpc.kernels.curved_forces import evaluate, find_gaps, find_lone_forces
 from rubhpc.kernels.curved_joint import find_joint_system, move_jointly, take_joint_states
+from rubhpc.kernels.curved_levels import fill_level
 from rubhpc.kernels.curved_loads import (
     FORCES,
     GUESS,
@@ -104,6 +105,8 @@ def take_step(
     int
         Binary logarithm of the allowed growth of the next step.
     """
+    if not curved.is_filled[mode, level]:
+        fill_level(curved, mode, level, step)
     mask = int(tables.mask[mode])
     scale = work.span[LARGEST]
     for i in range(pairs.radius.size):

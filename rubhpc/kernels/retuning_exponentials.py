@@ -25,7 +25,7 @@ def retune_powers(tables: ModeTables, mode: int, exponent: Complexes, end: int, 
         if level % SQUARED == 0:
             time = tick * 2.0**level
             for k in range(end):
-                power = _exponential(exponent[k], time)
+                power = exponential(exponent[k], time)
                 re[k], im[k] = power.real, power.imag
         else:  # to square doubles the rounding
             re_before, im_before = power_re[level - 1], power_im[level - 1]
@@ -74,7 +74,7 @@ def retune_outputs(
             if row[o, k] != 0.0 or real[o] != 0.0 or imaginary[o] != 0.0:
                 seen[count] = o
                 count += 1
-        onward, ahead = _exponential(exponent[k], interval), 1.0 + 0j
+        onward, ahead = exponential(exponent[k], interval), 1.0 + 0j
         for later in range(n_ahead):
             for i in range(count):
                 o = seen[i]
@@ -85,7 +85,7 @@ def retune_outputs(
 
 
 @jit
-def _exponential(exponent: complex, time: float) -> complex:
+def exponential(exponent: complex, time: float) -> complex:
     """Exponential over a time, s, in a quarter of the time of one that looks for infinite arguments."""
     size, turn = np.exp(exponent.real * time), exponent.imag * time
     return complex(size * np.cos(turn), size * np.sin(turn))

@@ -29,7 +29,7 @@ CHANGING_SPEED = 36  # run-ups and drives
 COULOMB = 27  # set-valued friction
 PENALTY = 1  # method = "modal" with a penalty, for whose sake modes are kept
 SOFT_FRICTION = 1  # a penalty with set-valued friction
-CURVED = 10  # method = "modal" with gaps that are curved
+CURVED = 11  # method = "modal" with gaps that are curved
 RESTITUTION = 2  # method = "modal" with restitution, for whose sake modes are kept
 CURVED_RINGS = 1  # the same with several stators
 SEVERAL_STATORS = 4  # method = "modal" with more than one

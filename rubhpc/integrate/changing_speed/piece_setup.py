@@ -71,7 +71,7 @@ class HeldMatrices:
         self.model, self.reduced = model, reduced
         self.at_hand = reduced  # at the speed of the current piece
         self.twist = self.lean = np.zeros(model.sag.size)  # sag under 1 N m of a drive; under 1 rad/s^2
-        self.sags: list[Floats] = []  # at the same speeds, where they depend on the speed
+        self.sagging_models: list[Model] = []  # at `followed_modes.NODES`, where the sag depends on the speed
         self.kept = KeptParts()
         self.bodies: dict[float, Reduced] = {}  # of each friction, without what a piece changes
         self.sample_level = sample_level  # of the lowest speed
@@ -129,8 +129,8 @@ class HeldMatrices:
         return bool(self._beside)
 
     def within(self, speed: float) -> float:
-        """Place of a speed (rad/s) in the range, from -1 to 1; 0 where the matrices are constant."""
-        return (speed - self.reduced.spin) / self.reach if self._beside else 0.0
+        """Place of a speed (rad/s) in the range, from -1 to 1."""
+        return (speed - self.reduced.spin) / self.reach
 
     def at_place(self, within: float, rise: float) -> ReducedModel:
         """The model at a place in the range and of the acceleration; its unbalance is that of the middle."""
@@ -149,14 +149,15 @@ class HeldMatrices:
 
     def sagging(self, torque: float, acceleration: float, speed: float) -> Model:
         """The model with the sag under a drive's torque, N m, at an acceleration and a speed, rad/s."""
-        within = self.within(speed) if self.sags else 0.0
+        models = self.sagging_models or [self.model]
+        within = self.within(speed) if self.sagging_models else 0.0
         asked = torque, acceleration, within
         if self._latest is None or self._latest[0] != asked:
-            sag = between(self.sags, within) if self.sags else self.model.sag
+            sag, rows = models[0].sag, models[0].probe_rows[0]
+            if within:
+                sag = between([model.sag for model in models], within)
+                rows = between([model.probe_rows[0] for model in models], within)
             sag = sag + torque * self.twist + acceleration * self.lean
-            rows = self.model.probe_rows[0]
-            if self.sags:
-                rows = between([rows, *(model.probe_rows[0] for model, _ in self._beside)], within)
             self._latest = asked, sagging(self.model, sag, rows)
         return self._latest[1]
 

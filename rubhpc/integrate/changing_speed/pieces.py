@@ -85,7 +85,7 @@ class Pieces:
         while first < speed.size:
             self._ranges.accelerations = least[first], greatest[first]
             held, last = self._find(float(speed[first]), float(acceleration[first])), first + 1
-            at_once = SAGGING_AT_ONCE if held.sags else AT_ONCE
+            at_once = SAGGING_AT_ONCE if held.sagging_models else AT_ONCE
             while (
                 last < min(speed.size, first + at_once)
                 and n_sample[last] == n_sample[first]

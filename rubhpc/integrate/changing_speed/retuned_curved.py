@@ -11,12 +11,12 @@ from rubhpc.integrate.reduced_model.curved_bodies import motion_rows
 from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
 from rubhpc.integrate.reduced_model.curved_tables import (
     StillParts,
-    steps_of,
+    n_tabulated,
     still_parts,
-    tuned_tables,
+    tuned_parts,
+    with_levels,
 )
 from rubhpc.integrate.reduced_model.table_stack import TableStack
-from rubhpc.kernels.curved_contact import CurvedTables
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -39,7 +39,7 @@ class RetunedCurvedLibrary(RetunedLibrary, CurvedLibrary):
         self._row, self._curved = motion_rows(args[0], args[1]), None
         self._at_piece = at_piece
         self._still: dict[int, StillParts] = {}  # by set of closed pairs
-        self._n_curved, self._n_step = 0, steps_of(keys["tick"], keys["n_level"]).size
+        self._n_curved, self._n_step = 0, n_tabulated(keys["tick"], keys["n_level"])
         # Its own desk: tables of curved gaps stay where they are. They are larger, and made piece by piece.
         super().__init__(*args, **keys | {"desks": None, "at_once": 1})
 
@@ -72,15 +72,17 @@ class RetunedCurvedLibrary(RetunedLibrary, CurvedLibrary):
     def _tune_curved(self, mask: int) -> None:
         place, tables = self._place[mask], self.tables()
         motion = tables.motion_re[place] + 1j * tables.motion_im[place]
-        steps = np.ldexp(self._speeds.tick[self._at], np.arange(self._n_step))
-        exponent = self._held[mask][1].exponent
-        tuned = tuned_tables(self._still[mask], self._at_piece(), exponent, motion, steps)
+        tick, still = float(self._speeds.tick[self._at]), self._still[mask]
+        tuned = tuned_parts(
+            still, self._at_piece(), self._held[mask][1].exponent, motion, tick * 2.0 ** (self._n_step - 1)
+        )
         if self._curved is None:
             self._curved = TableStack(1 + len(self.gap_jacobian), self._most_modes)
         if place == self._n_curved:
-            fields: list[Any] = [np.array(field[np.newaxis], order="C") for field in tuned]
-            self._curved.add(CurvedTables(*fields))
+            self._curved.add(with_levels(still, tuned, self._n_step))
             self._n_curved += 1
             return
-        for field, now in zip(self.curved_tables(), tuned, strict=True):
-            field[place] = now
+        tables = self.curved_tables()
+        for name, part in tuned.items():
+            getattr(tables, name)[place] = part
+        tables.is_filled[place] = False

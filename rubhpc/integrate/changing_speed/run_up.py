@@ -147,7 +147,7 @@ def integrate_run_up(
             reached = start_of(initial, setup, clearance, law.speed[0])
             goes_on = is_contact_free(initial, reached)
         ramp = None
-        if setup.held.sags and passing.is_open(reached, setup):
+        if setup.held.sagging_models and passing.is_open(reached, setup):
             end, acceleration = piece + len(block), float(accelerations[piece])
             lasts = float(times[end] - times[piece])
             ramp = sag_ramp(setup.held, acceleration, float(at_cuts[piece]), float(at_cuts[end]), lasts)

@@ -81,10 +81,10 @@ class SpeedRanges:
             reach, swing = self._held_reach(speed, acceleration, slope)
         if free is None:
             speed += np.sign(acceleration) * reach
-        model, reduced = self._reduced(speed, acceleration, slope, speed)
+        about = acceleration, slope, speed
+        model, reduced = self._reduced(speed, *about)
         beside = [
-            self._reduced(speed + place * reach, acceleration, slope, speed)
-            for place in (NODES[1:] if is_followed else ())
+            self._reduced(speed + place * reach, *about) for place in (NODES[1:] if is_followed else ())
         ]
         if all(np.array_equal(other.stiffness, reduced.stiffness) for _, other in beside) and all(
             np.array_equal(other.damping, reduced.damping) for _, other in beside
@@ -101,8 +101,9 @@ class SpeedRanges:
         held.is_balanced = not is_followed
         if free is not None:
             held.at_once = 1  # the speed after a piece follows from its energies
-        if beside and fastest.model.rotor.tabulated_speeds:
-            held.sags = [model.sag, *(other.sag for other, _ in beside)]
+        if free is None and fastest.model.rotor.tabulated_speeds:
+            others = beside or [self._reduced(speed + place * reach, *about) for place in NODES[1:]]
+            held.sagging_models = [model, *(other for other, _ in others)]
         held.template = PieceSetup(
             scheme=fastest.scheme,
             model=model,
@@ -128,9 +129,9 @@ class SpeedRanges:
             held.lean = sag_under(model.rotor, -0.5 * tilted)
         else:
             force = -self._inertia - tilted
-            if held.sags:  # dampers act against the rate of the sag
-                rotor, (_, below, above) = model.rotor, held.sags
-                rate = (above - below) / ((NODES[2] - NODES[1]) * reach)
+            if held.sagging_models:  # dampers act against the rate of the sag
+                rotor, (_, below, above) = model.rotor, held.sagging_models
+                rate = (above.sag - below.sag) / ((NODES[2] - NODES[1]) * reach)
                 force = force - (rotor.damping + speed * rotor.gyroscopic) @ rate
             held.lean = sag_under(model.rotor, force)
         return held
