@@ -11,7 +11,7 @@ from rubhpc.kernels.complementarity import UNSOLVED, residual_of, solve_active, 
 from rubhpc.kernels.contact_modes import Reduced
 from rubhpc.kernels.curved_contact import CurvedPairs, CurvedWork, is_closed
 from rubhpc.kernels.curved_forces import fill_geometry
-from rubhpc.kernels.mode_change import AT_REST, HIDDEN, OPENING, least_flight, observe_impact, product
+from rubhpc.kernels.mode_change import AT_REST, OPENING, hidden_flight, least_flight, observe_impact, product
 
 Floats = NDArray[np.float64]
 
@@ -121,7 +121,7 @@ def change_curved(
                     - product(reduced.damping[k], velocity)
                 )
             # A pair that parts so slowly that it is pressed together again at once counts as closed.
-            time = least_flight(acceleration, moment, HIDDEN)
+            time = least_flight(acceleration, moment, hidden_flight(reduced))
             if product(rate_row[i], velocity) <= OPENING + max(-acceleration, 0.0) * time:
                 speed[i] = acceleration
         active[i] = speed[i] < 0.0

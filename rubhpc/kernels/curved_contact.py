@@ -39,8 +39,9 @@ PARTS = np.ascontiguousarray(
 # Indices of `CurvedWork.span`: length of the step from which loads are extrapolated (0: none); largest force
 # of the contact; time that resolves force and slip; steps before a longer one is allowed; time since the
 # beginning of the step from which loads are extrapolated; sweeps of the last step; level of the steps for
-# which `system` is valid (a single pair); whether `follow` is valid for the closed pairs (several).
-BEFORE, LARGEST, RESOLVED, PATIENCE, PAST, SWEEPS, SOLVED, SLOPED = range(8)
+# which `system` is valid (a single pair); whether `follow` is valid for the closed pairs (several); pace
+# above which modes go on as they were where a mode is entered next, 1/s (0: none do).
+BEFORE, LARGEST, RESOLVED, PATIENCE, PAST, SWEEPS, SOLVED, SLOPED, KEPT = range(9)
 
 
 class CurvedPairs(NamedTuple):
@@ -107,7 +108,7 @@ class CurvedWork(NamedTuple):
     loads: Floats  # the same, flat
     before: Floats  # (5, q, 4 + b), loads of the step from which they are extrapolated
     gap: Floats  # (2, 5, q), of open pairs at the nodes, m, and their rates
-    span: Floats  # (8,), see above
+    span: Floats  # (9,), see above
     motion: Floats  # (3, q, 3 + b), displacements, rates and free accelerations at a node
     free: Floats  # (4 (3 d + 1),), readings of a single pair at the nodes, without the unknown loads
     normal: Floats  # (2, q), along and across
@@ -173,7 +174,7 @@ def curved_work(q: int, n_row: int, n: int, m: int, n_loss: int, n_level: int) -
         loads=load.reshape(-1),
         before=np.zeros((N_NODE, q, n_row + 1)),
         gap=np.zeros((2, N_NODE, q)),
-        span=np.zeros(8),
+        span=np.zeros(9),
         motion=np.zeros((3, q, n_row)),
         free=np.zeros((N_NODE - 1) * (3 * n_row - 2)),
         normal=np.zeros((2, q)),

@@ -29,27 +29,18 @@ from rubhpc.kernels.contact_modes import (
     FORCED_LEVEL,
     ModeTables,
     Reduced,
-    enter,
     find_mode,
     propagate,
 )
 from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.curved_contact import (
-    ALONG,
-    BEFORE,
-    LARGEST,
-    PAST,
-    PATIENCE,
     RESOLVED,
-    SLOPED,
-    SOLVED,
     CurvedPairs,
     CurvedTables,
     CurvedWork,
-    is_closed,
 )
+from rubhpc.kernels.curved_entry import enter_curved
 from rubhpc.kernels.curved_event import take_curved_event
-from rubhpc.kernels.curved_forces import evaluate, find_gaps
 from rubhpc.kernels.curved_measuring import (
     begin_curved_span,
     observe_curved_step,
@@ -67,7 +58,7 @@ from rubhpc.kernels.curved_search import (
 from rubhpc.kernels.curved_step import follow_loads, go_on, take_step
 from rubhpc.kernels.event_steps import choose_step, contact_age, end_record, longest_step, sample_step
 from rubhpc.kernels.measuring import begin_span
-from rubhpc.kernels.mode_change import product
+from rubhpc.kernels.mode_change import GAP_TOLERANCE
 from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
 
 if TYPE_CHECKING:
@@ -116,13 +107,18 @@ def advance_curved(
     progress.halving_level, progress.is_after_event = NONE, 0
     due = int(np.int64(NONE))  # ticks until a closed contact is expected to end, or another pair to touch
     groping = int(np.int64(0))  # level of the next step after that
+    is_begun = progress.wanted < 0
     while True:
         if progress.wanted >= 0:
             found = find_mode(mask, progress.wanted)
             if found < 0:
                 return MODE_WANTED
-            if not enter_curved(tables, curved, pairs, reduced, clock, found, progress, z, motion, work):
+            is_same = is_begun and found == progress.mode and reduced.overlap > GAP_TOLERANCE
+            if not enter_curved(
+                tables, curved, pairs, reduced, clock, found, is_same, progress, z, motion, work
+            ):
                 return CONTACT_UNSOLVED
+            is_begun = True
         mode = progress.mode
         closed = int(mask[mode])
         if is_recorded and progress.energy_from < 0:
@@ -176,7 +172,7 @@ def advance_curved(
             )
             progress.n_step += 1
             if not is_event_free:
-                crossing = open_crossing(tables, curved, pairs, mode, next_re, next_im, work)
+                crossing = open_crossing(tables, curved, pairs, mode, reduced.overlap, next_re, next_im, work)
         else:
             # Vibration after an event is fast at first: steps grow with the age of the contact.
             age = contact_age(progress) + GROWTH
@@ -217,7 +213,7 @@ def advance_curved(
                 progress.resolved_level = level + growth
             progress.is_after_event = 0
             if not is_event_free:
-                crossing = closed_crossing(closed, work)
+                crossing = closed_crossing(closed, reduced.overlap, work)
         if crossing != 0 and level > 0 and closed == 0:
             progress.halving_level = level - 1
             continue
@@ -279,45 +275,3 @@ def advance_curved(
             z_re[k], z_im[k] = next_re[k], next_im[k]
         progress.tick += 1 << level
         progress.halving_level = max(progress.halving_level - 1, NONE)
-
-
-@jit_lean_sum
-def enter_curved(
-    tables: ModeTables,
-    curved: CurvedTables,
-    pairs: CurvedPairs,
-    reduced: Reduced,
-    clock: Clock,
-    found: int,
-    progress: Progress,
-    z: Floats,
-    motion: Floats,
-    work: CurvedWork,
-) -> bool:
-    """Enter contact mode `found` with the reduced motion (2 n,); False where no forces are found."""
-    q, n = reduced.gap_jacobian.shape
-    closed = int(tables.mask[found])
-    for i in range(q):
-        work.h[0, i], work.rate[0, i] = 0.0, 0.0
-        if is_closed(closed, i):
-            work.h[0, i] = -pairs.clearance[i] - product(pairs.row[i, ALONG], motion[:n])
-            work.rate[0, i] = -product(pairs.row[i, ALONG], motion[n:])
-    for i in range(q):
-        if is_closed(closed, i):
-            for k in range(n):
-                motion[k] += curved.shift[found, i, k] * work.h[0, i]
-                motion[n + k] += curved.shift[found, i, k] * work.rate[0, i]
-    cosine, sine = shaft_turn(clock, progress.tick)
-    enter(tables, found, reduced.clearance, cosine, sine, motion, z)
-    progress.mode, progress.wanted, progress.entered = found, NONE, progress.tick
-    progress.resolved_level, progress.halving_level, progress.is_after_event = FORCED_LEVEL, NONE, 1
-    progress.contact_age = NONE
-    work.span[BEFORE], work.span[PAST], work.span[LARGEST], work.span[PATIENCE] = 0.0, 0.0, 0.0, 0.0
-    work.span[SOLVED], work.span[SLOPED] = 1.0 * NONE, 0.0
-    work.is_solved[:] = False
-    if closed == 0:
-        return True
-    if not evaluate(pairs, curved, reduced.rim_speed, found, closed, 0, z[0], z[1], work):
-        return False
-    find_gaps(pairs, curved, found, closed, 0, z[0], z[1], work)
-    return True

@@ -72,11 +72,16 @@ def open_crossing(
     curved: CurvedTables,
     pairs: CurvedPairs,
     mode: int,
+    overlap: float,
     z_re: Floats,
     z_im: Floats,
     work: CurvedWork,
 ) -> int:
-    """Set of the pairs whose gap is negative, while all are open."""
+    """Set of the pairs whose gap is negative, while all are open.
+
+    A pair that parts is none of them up to an `overlap` (m): modes that follow the speed leave one as they
+    are entered.
+    """
     crossing = int(np.int64(0))
     is_near = False
     for i in range(pairs.radius.size):
@@ -86,23 +91,36 @@ def open_crossing(
         return crossing
     read_motion(curved, mode, 0, ALL, z_re, z_im, work.motion)
     for i in range(pairs.radius.size):
-        gap, _ = fill_geometry(pairs, i, curved.bound.shape[2], work)
-        if gap < -GAP_TOLERANCE:
+        d = curved.bound.shape[2]
+        gap, _ = fill_geometry(pairs, i, d, work)
+        rate = 0.0
+        for j in range(d):
+            rate += work.jacobian[i, j] * work.motion[1, i, j]
+        if has_closed(gap, rate, overlap):
             crossing |= 1 << i
     return crossing
 
 
 @jit_inline_sum
-def closed_crossing(closed: int, work: CurvedWork) -> int:
-    """Set of the pairs whose force (closed) or gap (open) is negative at or between the nodes of a step."""
+def has_closed(gap: float, rate: float, overlap: float) -> bool:
+    """Whether an open gap (m) with its rate (m/s) has closed, but for an `overlap` (m) as it parts."""
+    return gap < -GAP_TOLERANCE and (rate < 0.0 or gap < -overlap)
+
+
+@jit_inline_sum
+def closed_crossing(closed: int, overlap: float, work: CurvedWork) -> int:
+    """Set of the pairs whose force (closed) or gap (open) is negative at or between the nodes of a step.
+
+    `overlap` (m) as in `open_crossing`.
+    """
     crossing = int(np.int64(0))
     for i in range(work.h.shape[1]):
         least = np.inf
         for node in range(1, N_NODE):
             if is_closed(closed, i):
                 least = min(least, work.force[node, i])
-            else:
-                least = min(least, work.gap[0, node, i] + GAP_TOLERANCE)
+            elif has_closed(work.gap[0, node, i], work.gap[1, node, i], overlap):
+                least = -1.0
         if is_closed(closed, i) and work.force[0, i] > 0.0:
             for node in range(2):
                 least = min(least, lowest(work.force[:, i], 2 * node))

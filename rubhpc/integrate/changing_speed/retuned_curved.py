@@ -11,10 +11,11 @@ from rubhpc.integrate.reduced_model.curved_bodies import motion_rows
 from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
 from rubhpc.integrate.reduced_model.curved_tables import (
     StillParts,
+    empty_tables,
     n_tabulated,
+    push,
     still_parts,
-    tuned_parts,
-    with_levels,
+    tune,
 )
 from rubhpc.integrate.reduced_model.table_stack import TableStack
 
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
     from rubhpc.kernels.contact_modes import ModeTables
-    from rubhpc.kernels.retuning import HeldMode
 
 
 class RetunedCurvedLibrary(RetunedLibrary, CurvedLibrary):
@@ -60,10 +60,10 @@ class RetunedCurvedLibrary(RetunedLibrary, CurvedLibrary):
         self._still.clear()
         super().forget()
 
-    def _hold(self, mode: ContactMode, row: ModeTables | None, linear: Linear) -> HeldMode:
+    def _tabulate(self, mode: ContactMode, row: ModeTables | None = None) -> None:
         directions = self.gap_jacobian, self.force_direction
-        self._still[mode.mask] = still_parts(mode, self.reduced, self._row, directions, self.width)
-        return super()._hold(mode, row, linear)
+        self._still[mode.mask] = still_parts(mode, self.reduced, self._row, directions)
+        super()._tabulate(mode, row)
 
     def _linear(self, mode: ContactMode) -> Linear:
         linear = super()._linear(mode)  # friction follows the momentary normal, and is not counted
@@ -71,18 +71,16 @@ class RetunedCurvedLibrary(RetunedLibrary, CurvedLibrary):
 
     def _tune_curved(self, mask: int) -> None:
         place, tables = self._place[mask], self.tables()
-        motion = tables.motion_re[place] + 1j * tables.motion_im[place]
-        tick, still = float(self._speeds.tick[self._at]), self._still[mask]
-        tuned = tuned_parts(
-            still, self._at_piece(), self._held[mask][1].exponent, motion, tick * 2.0 ** (self._n_step - 1)
-        )
+        reduced, still = self._at_piece(), self._still[mask]
         if self._curved is None:
             self._curved = TableStack(1 + len(self.gap_jacobian), self._most_modes)
-        if place == self._n_curved:
-            self._curved.add(with_levels(still, tuned, self._n_step))
+        is_new = place == self._n_curved
+        if is_new:
+            self._curved.add(empty_tables(still, self.width, self._n_step))
             self._n_curved += 1
-            return
-        tables = self.curved_tables()
-        for name, part in tuned.items():
-            getattr(tables, name)[place] = part
-        tables.is_filled[place] = False
+        curved = self.curved_tables()
+        if is_new or (self._beside and still.closed):
+            push(curved, place, still, reduced, (tables.enter_re[place] + 1j * tables.enter_im[place]).T)
+        motion = tables.motion_re[place], tables.motion_im[place]
+        longest = float(self._speeds.tick[self._at]) * 2.0 ** (self._n_step - 1)
+        tune(curved, place, still, reduced, self._held[mask][1].exponent, motion, longest)

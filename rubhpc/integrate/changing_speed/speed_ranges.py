@@ -73,7 +73,7 @@ class SpeedRanges:
         That of a free spin, which may turn back, is in the middle of the range.
         """
         fastest, free = self._fastest, self._fastest.free_spin
-        is_followed = free is None and not fastest.is_updated
+        is_followed = free is None
         judge: Judge | None = None
         if is_followed:
             reach, swing, judge = self._followed_reach(speed, acceleration)

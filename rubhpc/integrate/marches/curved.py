@@ -10,10 +10,10 @@ from rubhpc.errors import InputError
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.marches.march import NO_FORCES
 from rubhpc.integrate.marches.met_modes import NoClosedForm
-from rubhpc.integrate.reduced_model.curved_bodies import curved_pairs
+from rubhpc.integrate.reduced_model.curved_bodies import curved_pairs, followed_pairs
 from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
 from rubhpc.kernels.case_progress import ask_for, begin_in
-from rubhpc.kernels.curved_contact import curved_work
+from rubhpc.kernels.curved_contact import KEPT, curved_work
 from rubhpc.kernels.curved_loop import advance_curved
 
 if TYPE_CHECKING:
@@ -52,15 +52,18 @@ class CurvedMarch(EventDrivenMarch):
         self._force = initial.contact_force.copy()
         self._is_bent = any(stator.squared_slope is not None for stator in setup.model.stators)
         super().__init__(setup, clearance, friction, initial, check)
-        self._take_pairs()
+        self._pairs = curved_pairs(
+            setup.reduced, setup.model, self._coefficient, self._clearance, is_round=setup.is_updated
+        )
+        self._make_work()
 
     def begin(self, setup: ModalSetup, place: Place) -> None:
         """Begin again at another speed in the same reduced coordinates, from the end of a march."""
         before, self._force = self._setup, place.contact_force.copy()
         super().begin(setup, place)
         if setup.reduced.stiffness is not before.reduced.stiffness or setup.model is not before.model:
-            self._take_pairs()
-        else:
+            self._pairs = followed_pairs(self._pairs, setup.reduced, setup.model, self._clearance)
+        if self._sizes() != self._sized:
             self._make_work()
 
     def start_again(self, state: State) -> bool:
@@ -69,18 +72,13 @@ class CurvedMarch(EventDrivenMarch):
         self._start_at(state)
         return True
 
-    def _take_pairs(self) -> None:
-        """Compute the arrays for curved gaps."""
-        setup = self._setup
-        self._pairs = curved_pairs(
-            setup.reduced, setup.model, self._coefficient, self._clearance, is_round=setup.is_updated
-        )
-        self._make_work()
+    def _sizes(self) -> tuple[int, ...]:
+        """Coordinates, losses and tabulated steps."""
+        return self._z.shape[1], self._curved.sign.shape[1], self._curved.is_filled.shape[1]
 
     def _make_work(self) -> None:
-        _, n_row, n = self._pairs.row.shape
-        n_loss, n_level = self._curved.sign.shape[1], self._curved.node_re.shape[1]
-        self._work = curved_work(self._clearance.size, n_row, n, self._z.shape[1], n_loss, n_level)
+        self._sized = self._sizes()
+        self._work = curved_work(self._clearance.size, *self._pairs.row.shape[1:], *self._sized)
 
     def motion(self) -> Floats:
         """Reduced displacements, then velocities (2 n,), at the sample reached."""
@@ -120,6 +118,9 @@ class CurvedMarch(EventDrivenMarch):
     def _find_library(self, setup: ModalSetup, friction: float) -> ModeLibrary:
         return setup.curved_library(friction)
 
+    def _keep(self, z: Floats, slowest: float) -> None:
+        self._z[:], self._work.span[KEPT] = z, slowest  # until the mode is entered
+
     def _start(self, mode: int) -> None:
         begin_in(self._bare_progress, mode)
         ask_for(self.progress, int(self.tables.mask[mode]))
@@ -151,6 +152,6 @@ class CurvedMarch(EventDrivenMarch):
         raise NoClosedForm
 
     def _contact_force(self) -> Floats:
-        if self.progress.wanted >= 0:
+        if self._bare_progress["wanted"] >= 0:
             return self._force
         return np.where(self.touching(), np.maximum(self._work.force[0], np.finfo(float).tiny), 0.0)

@@ -111,11 +111,14 @@ class EventDrivenMarch(ContactSets):
         Modes follow the speed, which changes evenly, and do not ring for it (`kernels.pieces.begin_piece`).
         """
         mask, z = before
-        if self.moved_by(self.mask) != mask:
-            return
+        if self.moved_by(self.mask) == mask:
+            self._keep(z, max(FAST * abs(spin), QUICK / since))
+
+    def _keep(self, z: Floats, slowest: float) -> None:
+        """Let modes with a pace above `slowest`, 1/s, have the coordinates (2, m)."""
         mode = int(self._bare_progress["mode"])
         pace = self.tables.pace[mode]
-        fast = (pace > max(FAST * abs(spin), QUICK / since)) | (pace == DYING)
+        fast = (pace > slowest) | (pace == DYING)
         fast[int(self.tables.n_eigenmode[mode]) :] = False
         self._z[:, fast] = z[:, fast]
 

@@ -29,12 +29,11 @@ def curved_pairs(
     row = motion_rows(reduced, model)
     flat = row.reshape(-1, row.shape[2])
     sense = plain(rim_sense)(reduced.spin)
-    skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
     return CurvedPairs(
         row=row,
         gram=(flat @ flat.T).reshape(*row.shape[:2], *row.shape[:2]),
         output=_outputs(reduced),
-        skew=skew if np.abs(skew).max() > SKEWED * np.abs(reduced.stiffness).max() else skew[:0],
+        skew=_skew(reduced),
         radius=np.array([stator.radius for stator in model.stators]),
         clearance=clearance,
         aside=sag_at_stators(model)[1],
@@ -45,6 +44,14 @@ def curved_pairs(
         leverage=_leverage(row, reduced),
         is_round=is_round,
         sense=sense,
+    )
+
+
+def followed_pairs(pairs: CurvedPairs, reduced: ReducedModel, model: Model, clearance: Floats) -> CurvedPairs:
+    """The same pairs about another sag, with its clearances (q,) in m; scales of errors stay."""
+    output = _outputs(reduced) if reduced.probe.size else pairs.output
+    return pairs._replace(
+        output=output, skew=_skew(reduced), clearance=clearance, aside=sag_at_stators(model)[1]
     )
 
 
@@ -61,6 +68,12 @@ def motion_rows(reduced: ReducedModel, model: Model) -> Floats:
         rows[i, BENDING : BENDING + len(those)] = those
     rows[:, -1] = torsion
     return rows
+
+
+def _skew(reduced: ReducedModel) -> Floats:
+    """Skew part of the stiffness (n, n), or no rows where it is rounding."""
+    skew: Floats = 0.5 * (reduced.stiffness - reduced.stiffness.T)
+    return skew if np.abs(skew).max() > SKEWED * np.abs(reduced.stiffness).max() else skew[:0]
 
 
 def _bending(stator: StatorModel, reduced: ReducedModel, model: Model, i: int) -> Floats:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels.curved_contact import N_NODE, CurvedTables
+from rubhpc.kernels.curved_tuning import tune_curved
 
 if TYPE_CHECKING:
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode
@@ -43,39 +44,54 @@ def tabulate_curved(
         As in `mode_library.ModeLibrary`.
     """
     n, end = reduced.stiffness.shape[0], mode.exponent.size
-    exponent = np.zeros(width, dtype=complex)
-    exponent[:end] = mode.exponent
-    motion = np.zeros((2 * n, width), dtype=complex)
-    motion[:, :end] = mode.motion
-    still = still_parts(mode, reduced, row, directions, width)
-    n_step = n_tabulated(tick, n_level)
-    return with_levels(
-        still, tuned_parts(still, reduced, exponent, motion, tick * 2.0 ** (n_step - 1)), n_step
+    exponent, enter = np.zeros(width, dtype=complex), np.zeros((width, 2 * n), dtype=complex)
+    exponent[:end], enter[: len(mode.enter)] = mode.exponent, mode.enter
+    motion = np.zeros((2 * n, width)), np.zeros((2 * n, width))
+    motion[0][:, :end], motion[1][:, :end] = mode.motion.real, mode.motion.imag
+    still, n_step = still_parts(mode, reduced, row, directions), n_tabulated(tick, n_level)
+    tables = empty_tables(still, width, n_step)
+    push(tables, 0, still, reduced, enter)
+    tune(tables, 0, still, reduced, exponent, motion, tick * 2.0 ** (n_step - 1))
+    return tables
+
+
+def empty_tables(still: StillParts, width: int, n_step: int) -> CurvedTables:
+    """Tables of a mode, (1, ...) each, for steps of `n_step` lengths, without what belongs to matrices."""
+    q, d = len(still.row), still.row.shape[1] - 1
+    n_loss, n_at = still.size.size, N_NODE - 1
+    n_read, n_load = 3 * d + 1, d + 2
+    n_seen = n_read if q == 1 else 0
+    drain_moved = np.zeros((1, n_loss + 2, q))
+    drain_moved[0, :n_loss] = (still.shift @ still.dampers).T
+    return CurvedTables(
+        used=np.full(1, width),
+        read_re=np.zeros((1, q, n_read, width)),
+        read_im=np.zeros((1, q, n_read, width)),
+        bound=np.zeros((1, q, d, width)),
+        shift=still.shift[np.newaxis],
+        moved=still.moved[np.newaxis],
+        accel=np.zeros((1, q, d, q)),
+        accel_rate=np.zeros((1, q, d, q)),
+        load_re=np.zeros((1, q, n_load, width)),
+        load_im=np.zeros((1, q, n_load, width)),
+        exponent_re=np.zeros((1, width)),
+        exponent_im=np.zeros((1, width)),
+        is_filled=np.zeros((1, n_step), dtype=np.bool_),
+        node_re=np.zeros((1, n_step, n_at, width)),
+        node_im=np.zeros((1, n_step, n_at, width)),
+        weight_re=np.zeros((1, n_step, n_at, N_NODE, width)),
+        weight_im=np.zeros((1, n_step, n_at, N_NODE, width)),
+        seen_re=np.zeros((1, n_load, n_seen, width)),
+        seen_im=np.zeros((1, n_load, n_seen, width)),
+        lone=np.zeros((1, n_step, 2, width, n_at * n_seen)),
+        reach=np.zeros((1, n_step, N_NODE * n_load, n_at * n_seen)),
+        reached=np.zeros((1, n_step, n_at * n_seen, n_at * n_load)),
+        inverse_re=np.zeros((1, width)),
+        inverse_im=np.zeros((1, width)),
+        drain=np.zeros((1, 2, width, n_loss + 2)),
+        sign=np.sign(still.size)[np.newaxis],
+        drain_moved=drain_moved,
     )
-
-
-def with_levels(still: StillParts, tuned: dict[str, Any], n_step: int) -> CurvedTables:
-    """Tables of a mode, (1, ...) each, with room for steps of `n_step` lengths."""
-    n_load, n_read, width = tuned["seen_re"].shape
-    n_at, n_read = N_NODE - 1, (N_NODE - 1) * n_read
-    parts = {
-        "shift": still.shift,
-        "moved": still.moved,
-        "accel": still.accel,
-        "accel_rate": still.accel_rate,
-        "load_re": still.load.real,
-        "load_im": still.load.imag,
-        "is_filled": np.zeros(n_step, dtype=np.bool_),
-        "node_re": np.zeros((n_step, n_at, width)),
-        "node_im": np.zeros((n_step, n_at, width)),
-        "weight_re": np.zeros((n_step, n_at, N_NODE, width)),
-        "weight_im": np.zeros((n_step, n_at, N_NODE, width)),
-        "lone": np.zeros((n_step, 2, width, n_read)),
-        "reach": np.zeros((n_step, N_NODE * n_load, n_read)),
-        "reached": np.zeros((n_step, n_read, n_at * n_load)),
-        "sign": np.sign(still.size),
-    }
-    return CurvedTables(**{name: np.array(part, order="C")[None] for name, part in (parts | tuned).items()})
 
 
 def n_tabulated(tick: float, n_level: int) -> int:
@@ -84,95 +100,92 @@ def n_tabulated(tick: float, n_level: int) -> int:
 
 
 class StillParts(NamedTuple):
-    """Parts of a mode's tables that do not depend on the spin speed, without terms of the unbalance."""
+    """Parts of a mode's tables that do not depend on the spin speed."""
 
     row: Floats  # (q, 3 + b, n), `curved_bodies.motion_rows`
     first: int  # coordinate of the response to the unbalance
-    shift: Floats  # (q, n), these as in `CurvedTables`
+    closed: list[int]
+    shift: Floats  # (q, n), as in `CurvedTables`
     moved: Floats
-    accel: Floats
-    accel_rate: Floats
-    load: Complexes  # (q, 4 + b, m)
+    passed: Floats  # (n, n), what the closed pairs leave of a force
     size: Floats  # (r,), eigenvalues of the damping
-    dampers: Floats  # (r, n), their shapes, times the roots of their sizes
+    dampers: Floats  # (n, r), their shapes, times the roots of their sizes
 
 
 def still_parts(
-    mode: ContactMode, reduced: ReducedModel, row: Floats, directions: tuple[Floats, Floats], width: int
+    mode: ContactMode, reduced: ReducedModel, row: Floats, directions: tuple[Floats, Floats]
 ) -> StillParts:
-    """Parts of the tables of a mode that belong to its matrices; arguments as of `tabulate_curved`."""
+    """Parts of the tables of a mode that do not depend on the speed; arguments as of `tabulate_curved`.
+
+    Energies, for which the damping is taken apart, are not requested where it depends on the speed.
+    """
     n, q = reduced.stiffness.shape[0], len(row)
     closed = [i for i in range(q) if mode.mask >> i & 1]
     rate, along = directions[0][closed], directions[1][closed].T
     shift = np.zeros((q, n))
     if closed:
         shift[closed] = np.linalg.solve((rate @ along).T, along.T)
-    elastic, damped = reduced.stiffness @ shift.T, reduced.damping @ shift.T
-    d = row.shape[1] - 1
-    flat = row[:, :d]
-    project = np.eye(n) - shift[closed].T @ rate
-    load = np.zeros((q, d + 2, width), dtype=complex)
-    entry = mode.enter[:, n:] @ project
-    for i in closed:
-        columns = [elastic[:, i], damped[:, i], *flat[i]]
-        load[i, :, : mode.n_eigenmode] = (entry @ np.array(columns).T).T
     size, shape = _losses(reduced)
     return StillParts(
         row=row,
         first=mode.n_eigenmode,
+        closed=closed,
         shift=shift,
         moved=row @ shift.T,
-        accel=flat @ elastic,
-        accel_rate=flat @ damped,
-        load=load,
+        passed=np.eye(n) - shift[closed].T @ rate,
         size=size,
-        dampers=(np.sqrt(np.abs(size)) * shape).T,
+        dampers=np.sqrt(np.abs(size)) * shape,
     )
 
 
-def tuned_parts(
-    still: StillParts, reduced: ReducedModel, exponent: Complexes, motion: Complexes, longest: float
-) -> dict[str, Any]:
-    """Parts of a mode's tables that belong to the speed and the unbalance force of `reduced`, by name.
+def push(
+    tables: CurvedTables, place: int, still: StillParts, reduced: ReducedModel, enter: Complexes
+) -> None:
+    """Fill what belongs to the matrices, but not to the speed; `enter` (m, 2 n) are the coordinates."""
+    row, n = still.row, reduced.stiffness.shape[0]
+    flat = row[:, :-1]
+    elastic, damped = reduced.stiffness @ still.shift.T, reduced.damping @ still.shift.T
+    tables.accel[place], tables.accel_rate[place] = flat @ elastic, flat @ damped
+    for i in still.closed:
+        columns = still.passed @ np.column_stack([elastic[:, i], damped[:, i], *flat[i]])
+        load = (enter[: still.first, n:] @ columns).T
+        tables.load_re[place, i, :, : still.first] = load.real
+        tables.load_im[place, i, :, : still.first] = load.imag
+
+
+def tune(
+    tables: CurvedTables,
+    place: int,
+    still: StillParts,
+    reduced: ReducedModel,
+    exponent: Complexes,
+    motion: tuple[Floats, Floats],
+    longest: float,
+) -> None:
+    """Fill what belongs to the speed and the unbalance force of `reduced`.
 
     Parameters
     ----------
-    exponent, motion : (m,), (2 n, m)
-        Of its coordinates, including that of the response.
+    exponent, motion : (m,), two of (2 n, m)
+        Of the coordinates, including that of the response; the motion by its real and its imaginary part.
     longest : float
         The longest step, s.
     """
-    row, n = still.row, reduced.stiffness.shape[0]
-    d = row.shape[1] - 1
-    flat = row[:, :d]
-    place, rate = motion[:n].view(np.float64), motion[n:].view(np.float64)  # NumPy would convert real factors
-    elastic, damped = flat @ reduced.stiffness, flat @ reduced.damping
-    read = np.concatenate([flat @ place, row @ rate, -elastic @ place - damped @ rate], axis=1).view(complex)
-    read[:, 2 * d + 1 :, still.first] += flat @ (reduced.force[0] - 1j * reduced.force[1])
-    is_lone = len(row) == 1
-    seen = (
-        read[0] * still.load[0, :, np.newaxis]
-        if is_lone
-        else np.zeros((d + 2, 0, exponent.size), dtype=complex)
+    tune_curved(
+        tables,
+        place,
+        still.first,
+        not still.closed,
+        longest,
+        exponent,
+        *motion,
+        still.row,
+        still.dampers,
+        reduced.stiffness,
+        reduced.damping,
+        reduced.force,
+        np.empty((2, len(reduced.stiffness))),
     )
-    growth = np.exp(np.maximum(exponent.real, 0.0) * longest)
-    inverse = np.divide(1.0, exponent, out=np.zeros_like(exponent), where=exponent != 0.0)
-    forces = np.concatenate([still.dampers, reduced.force])  # (r + 2, n)
-    drain = (forces @ rate).view(complex)
-    return {
-        "used": np.flatnonzero(np.any(motion != 0.0, axis=0))[-1] + 1,
-        "read_re": read.real,
-        "read_im": read.imag,
-        "bound": np.abs(read[:, :d]) * np.abs(exponent) ** 2 * growth,
-        "exponent_re": exponent.real,
-        "exponent_im": exponent.imag,
-        "seen_re": seen.real,
-        "seen_im": seen.imag,
-        "inverse_re": inverse.real,
-        "inverse_im": inverse.imag,
-        "drain": np.stack([drain.real.T, -drain.imag.T]),
-        "drain_moved": forces @ still.shift.T,
-    }
 
 
 def _losses(reduced: ReducedModel) -> tuple[Floats, Floats]:
