@@ -17,11 +17,11 @@ from rubhpc.kernels.case_progress import (
     Progress,
     shaft_turn,
 )
+from rubhpc.kernels.contact_event import MOST_EVENTS, EventWork
 from rubhpc.kernels.contact_modes import FORCED_LEVEL, ModeTables, Reduced
 from rubhpc.kernels.curved_change import change_curved
 from rubhpc.kernels.curved_contact import CurvedPairs, CurvedTables, CurvedWork, is_closed
 from rubhpc.kernels.curved_measuring import place
-from rubhpc.kernels.event_loop import MOST_EVENTS, EventWork
 from rubhpc.kernels.event_steps import end_mode, record_event, record_touch
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def take_curved_event(
     samples: Samples,
     accumulator: Accumulator,
 ) -> int:
-    """Take the event of the pairs `crossing`, as `event_loop.take_event` does."""
+    """Take the event of the pairs `crossing`, as `contact_event.take_event` does."""
     mode = progress.mode
     closed = int(tables.mask[mode])
     place(tables, curved, mode, z[0], z[1], work.h[0], work.rate[0], motion)

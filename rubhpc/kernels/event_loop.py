@@ -12,15 +12,13 @@ Times are whole ticks; the exponentials of 1, 2, 4, ... ticks are tabulated, so 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum, jit_part_sum
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.case_progress import (
-    CONTACT_UNSOLVED,
-    DIVERGED,
     FINISHED,
     MODE_WANTED,
     MOST_STEPS,
@@ -29,11 +27,10 @@ from rubhpc.kernels.case_progress import (
     UNDER_WAY,
     Clock,
     Progress,
-    shaft_turn,
 )
+from rubhpc.kernels.contact_event import begin_mode, take_event
 from rubhpc.kernels.contact_modes import (
     BOUND_LEVEL,
-    FORCED_LEVEL,
     ModeTables,
     Reduced,
     dot,
@@ -44,26 +41,19 @@ from rubhpc.kernels.event_steps import (
     choose_step,
     contact_age,
     end_record,
-    enter_wanted,
-    leave_mode,
     longest_step,
     note_resolved,
-    record_event,
-    record_touch,
     sample_step,
 )
-from rubhpc.kernels.measuring import begin_contact, begin_span, observe_step, resolved_contact
-from rubhpc.kernels.mode_change import GAP_TOLERANCE, change_contacts, product
-from rubhpc.kernels.penalty_events import change_pressed
+from rubhpc.kernels.measuring import observe_step, resolved_contact
+from rubhpc.kernels.mode_change import GAP_TOLERANCE
 from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
-from rubhpc.kernels.trail import Trail, no_trail, note_after, note_event, note_piece
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
+    from rubhpc.kernels.contact_event import EventWork
 
 Floats = NDArray[np.float64]
-
-MOST_EVENTS = 200_000  # in a revolution; more is chatter without end
 
 
 @jit_lean_sum
@@ -218,60 +208,6 @@ def advance(
         progress.halving_level = max(progress.halving_level - 1, NONE)
 
 
-class EventWork(NamedTuple):
-    """Work space of an event, q pairs."""
-
-    force: Floats  # (q,)
-    given: Floats  # (2, q), normal impulses of the event, N s, and tractions, which none has
-    speed: Floats  # (q,)
-    impulse: Floats  # (q,), accumulated before the event, N s
-    active: NDArray[np.bool_]  # (q,)
-    elimination: Floats  # (q, q + 1)
-    trail: Trail  # of the motion
-
-
-def event_work(q: int) -> EventWork:
-    """Work space of the events of q pairs, without a trail."""
-    return EventWork(
-        force=np.zeros(q),
-        given=np.zeros((2, q)),
-        speed=np.zeros(q),
-        impulse=np.zeros(q),
-        active=np.zeros(q, dtype=np.bool_),
-        elimination=np.zeros((q, q + 1)),
-        trail=no_trail(),
-    )
-
-
-@jit_part_sum
-def begin_mode(
-    tables: ModeTables,
-    reduced: Reduced,
-    clock: Clock,
-    is_recorded: bool,
-    progress: Progress,
-    z: Floats,
-    z_next: Floats,
-    motion: Floats,
-    recorder: Recorder,
-    trail: Trail,
-    is_begun: bool,
-) -> bool:
-    """Enter the contact mode wanted, if any, with the reduced motion (2 n,), and begin to measure it.
-
-    Returns False where the mode is not tabulated. `is_begun`: the motion was in one of these tables before.
-    """
-    is_entered = progress.wanted < 0
-    if not is_entered and enter_wanted(tables, reduced, clock, progress, motion, z, is_begun):
-        is_entered = True
-        note_piece(trail, tables.mask[progress.mode], z)
-    if is_entered and is_recorded:
-        if progress.energy_from < 0:
-            begin_span(tables, z, progress, recorder)
-        begin_contact(tables, reduced, progress.mode, z, z_next, recorder)
-    return is_entered
-
-
 @jit_lean_sum
 def note_resolution(
     tables: ModeTables, clock: Clock, highest_level: int, age: int, progress: Progress, z: Floats
@@ -307,66 +243,3 @@ def find_crossing(
         ):
             crossing |= 1 << i
     return crossing
-
-
-@jit_part_sum
-def take_event(
-    tables: ModeTables,
-    reduced: Reduced,
-    clock: Clock,
-    crossing: int,
-    is_recorded: bool,
-    progress: Progress,
-    z: Floats,
-    motion: Floats,
-    work: EventWork,
-    recorder: Recorder,
-    samples: Samples,
-    accumulator: Accumulator,
-) -> int:
-    """Take the event of the pairs `crossing`: what it makes of `motion`, and the contact mode wanted next.
-
-    Returns
-    -------
-    int
-        UNDER_WAY, DIVERGED or CONTACT_UNSOLVED.
-    """
-    spin, closed = clock.spin, tables.mask[progress.mode]
-    if not leave_mode(
-        tables, reduced, clock, is_recorded, progress, z, motion, work.impulse, recorder, accumulator
-    ):
-        return DIVERGED
-    note_event(work.trail, progress.tick, crossing)
-    cosine, sine = shaft_turn(clock, progress.tick)
-    moment = (1 << FORCED_LEVEL) * clock.tick
-    if reduced.spring > 0.0:
-        progress.wanted = change_pressed(reduced, closed, crossing, motion)
-    else:
-        progress.wanted = change_contacts(
-            reduced,
-            closed,
-            crossing,
-            spin,
-            moment,
-            cosine,
-            sine,
-            motion,
-            is_recorded,
-            work.force,
-            work.given[0],
-            work.speed,
-            work.active,
-            work.elimination,
-            accumulator,
-        )
-    if progress.wanted < 0 or progress.n_event > MOST_EVENTS:
-        return CONTACT_UNSOLVED
-    if work.trail.tick.size > 0:
-        for i in range(work.speed.size):
-            work.speed[i] = product(reduced.gap_jacobian[i], motion[motion.size // 2 :])
-        note_after(work.trail, work.speed, work.speed, work.given)
-    if is_recorded:
-        for i in range(reduced.radius.size):
-            record_event(clock, progress, work.impulse, i, samples, accumulator)
-            record_touch(i, (progress.wanted >> i) & 1 == 1, accumulator)
-    return UNDER_WAY

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import jit_lean_sum
 from rubhpc.kernels.case_progress import DIVERGED, FINISHED, MODE_WANTED, Clock, Progress
 from rubhpc.kernels.contact_modes import ModeTables, Reduced, dot, is_within
-from rubhpc.kernels.event_loop import EventWork, advance
+from rubhpc.kernels.event_loop import advance
 from rubhpc.kernels.penalty_events import pressed_pairs
 from rubhpc.kernels.pieces import (
     IN_PART,
@@ -33,6 +33,7 @@ from rubhpc.kernels.pieces import (
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
+    from rubhpc.kernels.contact_event import EventWork
     from rubhpc.kernels.sampling import Recorder
 
 Floats = NDArray[np.float64]

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.case_progress import FINISHED, Clock, Progress
 from rubhpc.kernels.contact_modes import ModeTables, Reduced, dot, is_within
-from rubhpc.kernels.event_loop import EventWork, advance
+from rubhpc.kernels.event_loop import advance
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
+    from rubhpc.kernels.contact_event import EventWork
     from rubhpc.kernels.sampling import Recorder
 
 Floats = NDArray[np.float64]

@@ -16,8 +16,9 @@ from rubhpc.kernels.case_progress import (
     PAUSED,
     restart_clock,
 )
+from rubhpc.kernels.contact_event import event_work
 from rubhpc.kernels.contact_modes import DYING
-from rubhpc.kernels.event_loop import advance, event_work
+from rubhpc.kernels.event_loop import advance
 from rubhpc.kernels.piece_loop import advance_pieces
 from rubhpc.kernels.pieces import FAST, QUICK
 from rubhpc.kernels.sections_loop import advance_sections

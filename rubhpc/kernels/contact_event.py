@@ -1,0 +1,142 @@
+"""An event of straight gaps: its effect on the motion and on the record, and the contact mode entered."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit_part_sum
+from rubhpc.kernels.case_progress import CONTACT_UNSOLVED, DIVERGED, UNDER_WAY, Clock, Progress, shaft_turn
+from rubhpc.kernels.contact_modes import FORCED_LEVEL, ModeTables, Reduced
+from rubhpc.kernels.event_steps import enter_wanted, leave_mode, record_event, record_touch
+from rubhpc.kernels.measuring import begin_contact, begin_span
+from rubhpc.kernels.mode_change import change_contacts, product
+from rubhpc.kernels.penalty_events import change_pressed
+from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.trail import Trail, no_trail, note_after, note_event, note_piece
+
+if TYPE_CHECKING:
+    from rubhpc.kernels.accumulators import Accumulator, Samples
+
+Floats = NDArray[np.float64]
+
+MOST_EVENTS = 200_000  # in a revolution; more is chatter without end
+
+
+class EventWork(NamedTuple):
+    """Work space of an event, q pairs."""
+
+    force: Floats  # (q,)
+    given: Floats  # (2, q), normal impulses of the event, N s, and tractions, which none has
+    speed: Floats  # (q,)
+    impulse: Floats  # (q,), accumulated before the event, N s
+    active: NDArray[np.bool_]  # (q,)
+    elimination: Floats  # (q, q + 1)
+    trail: Trail  # of the motion
+
+
+def event_work(q: int) -> EventWork:
+    """Work space of the events of q pairs, without a trail."""
+    return EventWork(
+        force=np.zeros(q),
+        given=np.zeros((2, q)),
+        speed=np.zeros(q),
+        impulse=np.zeros(q),
+        active=np.zeros(q, dtype=np.bool_),
+        elimination=np.zeros((q, q + 1)),
+        trail=no_trail(),
+    )
+
+
+@jit_part_sum
+def begin_mode(
+    tables: ModeTables,
+    reduced: Reduced,
+    clock: Clock,
+    is_recorded: bool,
+    progress: Progress,
+    z: Floats,
+    z_next: Floats,
+    motion: Floats,
+    recorder: Recorder,
+    trail: Trail,
+    is_begun: bool,
+) -> bool:
+    """Enter the contact mode wanted, if any, with the reduced motion (2 n,), and begin to measure it.
+
+    Returns False where the mode is not tabulated. `is_begun`: the motion was in one of these tables before.
+    """
+    is_entered = progress.wanted < 0
+    if not is_entered and enter_wanted(tables, reduced, clock, progress, motion, z, is_begun):
+        is_entered = True
+        note_piece(trail, tables.mask[progress.mode], z)
+    if is_entered and is_recorded:
+        if progress.energy_from < 0:
+            begin_span(tables, z, progress, recorder)
+        begin_contact(tables, reduced, progress.mode, z, z_next, recorder)
+    return is_entered
+
+
+@jit_part_sum
+def take_event(
+    tables: ModeTables,
+    reduced: Reduced,
+    clock: Clock,
+    crossing: int,
+    is_recorded: bool,
+    progress: Progress,
+    z: Floats,
+    motion: Floats,
+    work: EventWork,
+    recorder: Recorder,
+    samples: Samples,
+    accumulator: Accumulator,
+) -> int:
+    """Take the event of the pairs `crossing`: what it makes of `motion`, and the contact mode wanted next.
+
+    Returns
+    -------
+    int
+        UNDER_WAY, DIVERGED or CONTACT_UNSOLVED.
+    """
+    spin, closed = clock.spin, tables.mask[progress.mode]
+    if not leave_mode(
+        tables, reduced, clock, is_recorded, progress, z, motion, work.impulse, recorder, accumulator
+    ):
+        return DIVERGED
+    note_event(work.trail, progress.tick, crossing)
+    cosine, sine = shaft_turn(clock, progress.tick)
+    moment = (1 << FORCED_LEVEL) * clock.tick
+    if reduced.spring > 0.0:
+        progress.wanted = change_pressed(reduced, closed, crossing, motion)
+    else:
+        progress.wanted = change_contacts(
+            reduced,
+            closed,
+            crossing,
+            spin,
+            moment,
+            cosine,
+            sine,
+            motion,
+            is_recorded,
+            work.force,
+            work.given[0],
+            work.speed,
+            work.active,
+            work.elimination,
+            accumulator,
+        )
+    if progress.wanted < 0 or progress.n_event > MOST_EVENTS:
+        return CONTACT_UNSOLVED
+    if work.trail.tick.size > 0:
+        for i in range(work.speed.size):
+            work.speed[i] = product(reduced.gap_jacobian[i], motion[motion.size // 2 :])
+        note_after(work.trail, work.speed, work.speed, work.given)
+    if is_recorded:
+        for i in range(reduced.radius.size):
+            record_event(clock, progress, work.impulse, i, samples, accumulator)
+            record_touch(i, (progress.wanted >> i) & 1 == 1, accumulator)
+    return UNDER_WAY
