@@ -62,14 +62,13 @@ def begin_mode(
     motion: Floats,
     recorder: Recorder,
     trail: Trail,
-    is_begun: bool,
 ) -> bool:
     """Enter the contact mode wanted, if any, with the reduced motion (2 n,), and begin to measure it.
 
-    Returns False where the mode is not tabulated. `is_begun`: the motion was in one of these tables before.
+    Returns False where the mode is not tabulated.
     """
     is_entered = progress.wanted < 0
-    if not is_entered and enter_wanted(tables, reduced, clock, progress, motion, z, is_begun):
+    if not is_entered and enter_wanted(tables, reduced, clock, progress, motion, z):
         is_entered = True
         note_piece(trail, tables.mask[progress.mode], z)
     if is_entered and is_recorded:

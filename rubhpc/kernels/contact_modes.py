@@ -192,7 +192,7 @@ def enter(
 
 
 @jit_lean_sum
-def add_change(
+def enter_rest(
     motion_re: Floats,
     motion_im: Floats,
     enter_re: Floats,
@@ -200,10 +200,11 @@ def add_change(
     motion: Floats,
     z: Floats,
 ) -> None:
-    """Add to coordinates `z` (2, m) what an event without another contact mode makes of the motion (2 n,).
+    """Add to coordinates `z` (2, m) what entering a mode that follows the speed has left of a motion (2 n,).
 
-    Modes that follow the speed err as they are entered: entered again and again, the motion would be carried
-    away. The first arguments are rows of the mode's tables; the motion is overwritten with its change.
+    What enters such a mode inverts its shapes but for a small share, which is squared so: events that follow
+    one another would be due to it. The first arguments are rows of the mode's tables; the motion is
+    overwritten with that rest.
     """
     for k in range(motion.size):
         motion[k] -= dot(motion_re[k], motion_im[k], z[0], z[1])

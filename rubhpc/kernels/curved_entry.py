@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.case_progress import NONE, Clock, Progress, shaft_turn
-from rubhpc.kernels.contact_modes import DYING, FORCED_LEVEL, ModeTables, Reduced, add_change, enter
+from rubhpc.kernels.contact_modes import DYING, FORCED_LEVEL, ModeTables, Reduced, enter, enter_rest
 from rubhpc.kernels.curved_contact import (
     ALONG,
     BEFORE,
@@ -44,7 +44,7 @@ def enter_curved(
 ) -> bool:
     """Enter contact mode `found` with the reduced motion (2 n,); False where no forces are found.
 
-    `is_same`: the motion has not left it, and its modes follow the speed (`contact_modes.add_change`).
+    `is_same`: the motion has not left it, and its modes follow the speed (`contact_modes.enter_rest`).
     """
     q, n = reduced.gap_jacobian.shape
     closed = int(tables.mask[found])
@@ -59,7 +59,7 @@ def enter_curved(
                 motion[k] += curved.shift[found, i, k] * work.h[0, i]
                 motion[n + k] += curved.shift[found, i, k] * work.rate[0, i]
     if is_same:
-        add_change(
+        enter_rest(
             tables.motion_re[found],
             tables.motion_im[found],
             tables.enter_re[found],

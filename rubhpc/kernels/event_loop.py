@@ -112,17 +112,7 @@ def advance(
     while True:
         if progress.wanted >= 0 or not is_begun:
             if not begin_mode(
-                tables,
-                reduced,
-                clock,
-                is_recorded,
-                progress,
-                z,
-                z_next,
-                motion,
-                recorder,
-                work.trail,
-                is_begun,
+                tables, reduced, clock, is_recorded, progress, z, z_next, motion, recorder, work.trail
             ):
                 return MODE_WANTED
             is_begun = True

@@ -15,9 +15,9 @@ from rubhpc.kernels.contact_modes import (
     SAMPLES_AT_ONCE,
     ModeTables,
     Reduced,
-    add_change,
     dot,
     enter,
+    enter_rest,
     find_mode,
     is_beyond,
 )
@@ -40,17 +40,15 @@ def enter_wanted(
     progress: Progress,
     motion: Floats,
     z: Floats,
-    is_begun: bool,
 ) -> bool:
-    """Enter the contact mode wanted with the reduced motion (2 n,); False where the mode is not tabulated.
-
-    `is_begun`: the motion was in one of these tables before.
-    """
+    """Enter the contact mode wanted with the reduced motion (2 n,); False where the mode is not tabulated."""
     found = find_mode(tables.mask, progress.wanted)
     if found < 0:
         return False
-    if is_begun and found == progress.mode and reduced.overlap > GAP_TOLERANCE:
-        add_change(
+    cosine, sine = shaft_turn(clock, progress.tick)
+    enter(tables, found, reduced.clearance, cosine, sine, motion, z)
+    if reduced.overlap > GAP_TOLERANCE:
+        enter_rest(
             tables.motion_re[found],
             tables.motion_im[found],
             tables.enter_re[found],
@@ -58,9 +56,6 @@ def enter_wanted(
             motion,
             z,
         )
-    else:
-        cosine, sine = shaft_turn(clock, progress.tick)
-        enter(tables, found, reduced.clearance, cosine, sine, motion, z)
     progress.mode, progress.wanted, progress.entered = found, NONE, progress.tick
     progress.contact_age, progress.halving_level, progress.is_after_event = NONE, NONE, 1
     return True

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum, short_loops
 from rubhpc.kernels.accumulators import DAMPING_LOSS, UNBALANCE_WORK, Accumulator
 from rubhpc.kernels.case_progress import NONE, Clock, Progress, shaft_turn
-from rubhpc.kernels.contact_modes import ModeTables, add_rows, dot, find_mode
+from rubhpc.kernels.contact_modes import ModeTables, Reduced, add_rows, dot, enter_rest, find_mode
+from rubhpc.kernels.mode_change import GAP_TOLERANCE
 from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
 
 Floats = NDArray[np.float64]
@@ -33,12 +34,13 @@ def used_width(tables: ModeTables, mode: int) -> int:
 @jit_inline_sum
 @short_loops
 def enter_states(
-    tables: ModeTables, clearance: Floats, clock: Clock, progress: Progress, motion: Floats, z: Floats
+    tables: ModeTables, reduced: Reduced, clock: Clock, progress: Progress, motion: Floats, z: Floats
 ) -> bool:
     """Enter the contact mode wanted with the reduced motion (2 n,); False where the mode is not tabulated."""
     mode = find_mode(tables.mask, progress.wanted)
     if mode < 0:
         return False
+    clearance = reduced.clearance
     cosine, sine = shaft_turn(clock, progress.tick)
     used = used_width(tables, mode)
     for part in range(2):
@@ -60,6 +62,15 @@ def enter_states(
         add_rows(rows, motion, target)
         z[part, used:] = 0.0
     begin_states(tables, mode, clearance, cosine, sine, progress, z)
+    if reduced.overlap > GAP_TOLERANCE:
+        enter_rest(
+            tables.motion_re[mode],
+            tables.motion_im[mode],
+            tables.enter_re[mode],
+            tables.enter_im[mode],
+            motion,
+            z,
+        )
     return True
 
 

@@ -93,7 +93,7 @@ def advance_with_friction(
     go_on_without(earlier)
     while True:
         if progress.wanted >= 0:
-            if not enter_states(tables, reduced.clearance, clock, progress, motion, z):
+            if not enter_states(tables, reduced, clock, progress, motion, z):
                 if is_recorded:
                     observe_spans(
                         tables, bodies, clock, progress, recorder, samples, accumulator, transitions

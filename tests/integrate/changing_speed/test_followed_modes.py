@@ -9,6 +9,7 @@ from test_retuned_modes import LAWS, setup
 from rubhpc.integrate.changing_speed.followed_modes import NODES, matched
 from rubhpc.integrate.changing_speed.mode_parts import speeds_of
 from rubhpc.integrate.changing_speed.near_modes import near_mode
+from rubhpc.kernels.contact_modes import enter, enter_rest
 
 REACH = 20.0  # rad/s
 
@@ -116,6 +117,29 @@ def test_modes_follow_the_speed_in_third_order(q, law):
     errors = [error_at(base, law, matrices_of(base, size), law.masks[q], -1.0) for size in (20.0, 10.0)]
     assert errors[0] < 1e-3, errors
     assert errors[1] < 1e-7 or 5.0 < errors[0] / errors[1] < 14.0, errors
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: type(law).__name__)
+def test_what_entering_a_mode_leaves_of_a_motion_is_entered_too(law):
+    base = setup(3)
+    library, spin = library_of(base, law, matrices_of(base, 40.0)), base.spin - REACH
+    library.tune(
+        speeds_of([spin], [spin**2 + 0j], [0.0], [base.tick], base.spin, base.sample_level, REACH), 0
+    )
+    n, lost = len(base.reduced.stiffness), 0.0
+    size = 1e-4 * np.repeat([1.0, base.spin], n)
+    for mask in law.masks[3]:
+        library.add(mask)
+        tables, row = library.tables(), library.masks.index(mask)
+        rows = [getattr(tables, name)[row] for name in ("motion_re", "motion_im", "enter_re", "enter_im")]
+        steady, z = (np.full(tables.enter_constant.shape[1], 1e-4), 0.8, 0.6), np.zeros((2, library.width))
+        enter(tables, row, *steady, np.random.default_rng(5).normal(size=2 * n) * size, z)
+        motion = rows[0] @ z[0] - rows[1] @ z[1]  # one that the mode may have
+        enter(tables, row, *steady, motion, z)
+        lost = max(lost, np.abs((motion - rows[0] @ z[0] + rows[1] @ z[1]) / size).max())
+        enter_rest(*rows, motion.copy(), z)
+        assert np.abs((motion - rows[0] @ z[0] + rows[1] @ z[1]) / size).max() < 1e-11
+    assert lost > 1e-8
 
 
 @pytest.mark.parametrize("q", [1, 3])

@@ -5,6 +5,7 @@ import pytest
 
 from rubhpc import LumpedStator, Rig, Unbalance, read_rig, run_up
 from rubhpc.integrate.changing_speed import passing
+from rubhpc.integrate.marches import friction as friction_march
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.record import State
 from rubhpc.integrate.setup import prepare
@@ -29,8 +30,13 @@ def test_an_open_pair_that_overlaps_has_missed_an_event(overlap):
     assert march.has_lost_events(int(21 * lasts / setup.contact_step), lasts, motion, is_closed)
 
 
-def test_two_masses_that_carry_a_shaft_come_to_rest_as_the_speed_falls(monkeypatch):
-    """No piece needs short steps; two masses threw each other open for ever, and one was lost."""
+@pytest.mark.parametrize(
+    ("friction_law", "friction", "largest"), [("sliding", 0.1, 377.6e-6), ("coulomb", 0.3, 399.1e-6)]
+)
+def test_masses_that_carry_a_shaft_come_to_rest_as_the_speed_falls(
+    monkeypatch, friction_law, friction, largest
+):
+    """No event needs short steps; masses threw each other or themselves open for ever, and one was lost."""
     pump = Rotor(
         shaft=(
             ShaftSection(
@@ -60,13 +66,15 @@ def test_two_masses_that_carry_a_shaft_come_to_rest_as_the_speed_falls(monkeypat
     )
     stepped = []
     short = passing.ContactSteppingMarch
-    monkeypatch.setattr(passing, "ContactSteppingMarch", lambda *given: stepped.append(1) or short(*given))
+    for march in (passing, friction_march):
+        monkeypatch.setattr(march, "ContactSteppingMarch", lambda *given: stepped.append(1) or short(*given))
     found = run_up(
         Rig(name="pump", rotor=pump, stator=ring),
         speed_law=[(0.0, "2500 rpm"), (3.0, "5500 rpm"), (4.0, "5500 rpm"), (7.0, "2500 rpm")],
         clearance="150 um",
-        friction=0.1,
+        friction=friction,
+        friction_law=friction_law,
         samples_per_revolution=128,
     )
     assert not stepped
-    assert np.hypot(found.vertical, found.horizontal).max() == pytest.approx(377.6e-6, rel=1e-3)
+    assert np.hypot(found.vertical, found.horizontal).max() == pytest.approx(largest, rel=1e-3)
