@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -56,33 +56,20 @@ _SIGNALS = (
 SIGNAL_NAMES = tuple(name for name, *_ in _SIGNALS)
 SECTION_NAMES = ("vertical", "horizontal", "torsion")
 
-_WAVEFORMS = tuple(
-    Variable(name=n, role="waveform", dims=(*d, "sample"), dtype="float32", unit=u, long_name=t)
-    for n, d, u, t in _SIGNALS
-)
-_SPECTRA = tuple(
-    Variable(
-        name=f"spectrum_{n}",
-        role="spectrum",
-        dims=(*d, "order"),
-        dtype="float32",
-        unit=u,
-        long_name=f"amplitude (zero to peak) of the {t}",
+
+def _of_signals(
+    prefix: str, role: str, dim: str, text: str, dtype: str = "float32", names: tuple[str, ...] = SIGNAL_NAMES
+) -> tuple[Variable, ...]:
+    return tuple(
+        Variable(name=prefix + n, role=role, dims=(*d, dim), dtype=dtype, unit=u, long_name=text.format(t))
+        for n, d, u, t in _SIGNALS
+        if n in names
     )
-    for n, d, u, t in _SIGNALS
-)
-_SECTIONS = tuple(
-    Variable(
-        name=f"section_{n}",
-        role="section",
-        dims=(*d, "section"),
-        dtype="float64",
-        unit=u,
-        long_name=f"{t}, once a revolution",
-    )
-    for n, d, u, t in _SIGNALS
-    if n in SECTION_NAMES
-)
+
+
+_WAVEFORMS = _of_signals("", "waveform", "sample", "{}")
+_SPECTRA = _of_signals("spectrum_", "spectrum", "order", "amplitude (zero to peak) of the {}")
+_SECTIONS = _of_signals("section_", "section", "section", "{}, once a revolution", "float64", SECTION_NAMES)
 
 FINAL_STATE = "final_state"
 _STATE = Variable(
@@ -94,25 +81,8 @@ _STATE = Variable(
 )
 
 
-def _measure(
-    name: str,
-    unit: str,
-    long_name: str,
-    *dims: str,
-    dtype: str = "float64",
-    flags: tuple[str, ...] = (),
-    worst: Literal["max", "min"] = "max",
-) -> Variable:
-    return Variable(
-        name=name,
-        role="measure",
-        dims=dims,
-        dtype=dtype,
-        unit=unit,
-        long_name=long_name,
-        flags=flags,
-        worst=worst,
-    )
+def _measure(name: str, unit: str, long_name: str, *dims: str, **further: Any) -> Variable:
+    return Variable(name=name, role="measure", dims=dims, unit=unit, long_name=long_name, **further)
 
 
 _SETTINGS = tuple(
