@@ -9,7 +9,13 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum, jit_part_sum
 from rubhpc.kernels.case_progress import NONE
-from rubhpc.kernels.contact_modes import FORCED_LEVEL, bounded, dot, propagate
+from rubhpc.kernels.contact_modes import (
+    FORCED_LEVEL,
+    bounded,
+    dot,
+    positive_interval,
+    propagate,
+)
 from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.cubics import turning_value
 
@@ -141,21 +147,12 @@ def follow_piece(
                 seen += tables.translations[row, k] * motions[BEFORE, k]
             if not abs(seen) <= tables.displacement_limit:
                 return time, int(np.int64(-1))
-        first = lowest_bit(crossing)
+        first = floor_log2(crossing & -crossing)
         for row in range(motion.size):
             motions[GRADIENT, row] = dot(
                 tables.switch_re[first], tables.switch_im[first], tables.enter_re[row], tables.enter_im[row]
             )
     return time, crossing
-
-
-@jit_inline_sum
-def lowest_bit(bits: int) -> int:
-    """Index of the lowest bit of a number that is not 0."""
-    j = 0
-    while (bits >> j) & 1 == 0:
-        j += 1
-    return j
 
 
 @jit_inline_sum
@@ -171,12 +168,8 @@ def next_event(
     least: Floats,
 ) -> tuple[float, int]:
     """Find the first event after the coordinates (2, m) `z_entered`, as `follow_piece`; `z` is filled in."""
-    switch_re, switch_im, rate_re, rate_im = (
-        tables.switch_re,
-        tables.switch_im,
-        tables.rate_re,
-        tables.rate_im,
-    )
+    switch_re, switch_im = tables.switch_re, tables.switch_im
+    rate_re, rate_im = tables.rate_re, tables.rate_im
     bound, floor, exponent, drift = tables.bound, tables.floor, tables.exponent, tables.drift
     power_re, power_im = tables.power_re, tables.power_im
     n_switch, m = floor.size, z.shape[1]
@@ -206,7 +199,7 @@ def next_event(
                 for j in range(n_switch):
                     if floor[j] > -np.inf:
                         b = bounded(bound[j], z[0], z[1])
-                        free = min(free, positive_time(now[j], now_rate[j], b))
+                        free = min(free, positive_interval(now[j], now_rate[j], b))
                 while level > search_level and (1 << level) * tick > free:
                     level -= 1
             step = (1 << level) * tick
@@ -236,16 +229,6 @@ def next_event(
         passed += 1 << level
         is_forced = False
         halving = max(halving - 1, NONE)
-
-
-@jit_inline_sum
-def positive_time(value: float, rate: float, bend: float) -> float:
-    """Time, s, for which a function with a second derivative within `bend` stays positive."""
-    if not value > 0.0:
-        return 0.0
-    if bend > 0.0:
-        return float((rate + np.sqrt(rate * rate + 2.0 * bend * value)) / bend)
-    return -value / rate if rate < 0.0 else np.inf
 
 
 @jit_lean_sum

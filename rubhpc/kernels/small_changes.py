@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_apart_sum, jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.contact_modes import Reduced, add_rows, find_mode
+from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.elimination import eliminate
-from rubhpc.kernels.flow import GRADIENT, RATE_BEGUN, RATE_ENDED, lowest_bit
+from rubhpc.kernels.flow import GRADIENT, RATE_BEGUN, RATE_ENDED
 from rubhpc.kernels.mode_change import AT_REST, product
 from rubhpc.kernels.revolutions import AFTER, PieceModes, PieceRows
 
@@ -197,7 +198,7 @@ def saltate(
         Rate of the motion after the event.
     """
     n, row, jump = reduced.damping.shape[0], room.row, room.jump
-    rate = rates[lowest_bit(states[1])]
+    rate = rates[floor_log2(states[1] & -states[1])]
     for j in range(row.size):
         row[j] = 0.0
     add_rows(columns, motions[GRADIENT], row)

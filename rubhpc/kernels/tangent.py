@@ -19,6 +19,7 @@ from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.complementarity import solve_active
 from rubhpc.kernels.contact_modes import ModeTables, Reduced, add_rows, dot
 from rubhpc.kernels.coordinate_steps import floor_log2, turn_on
+from rubhpc.kernels.friction_spans import copy_coordinates
 from rubhpc.kernels.mode_change import AT_REST, product
 from rubhpc.kernels.trail import Trail  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.transitions import UNKNOWN, Transitions, add_impulses, pass_over, see
@@ -154,7 +155,7 @@ def carry_along(
         if is_touching or (
             modes.has_states and (trail.states[k + 1] & ~trail.states[k] != 0 or not modes.slips_evenly)
         ):
-            read_begun(trail, k, z)
+            copy_coordinates(trail.begun[k], z)
             move(tables, place, end - begun, z)
             for i in range(z.shape[1]):
                 z[0, i] += drift[i] * (end - begun) * tick
@@ -176,15 +177,14 @@ def carry_along(
             pass_over(transitions, passed, m, d, z)
             if strikes:
                 add_impulses(transitions, next_place, q, m, tangent.given, z)
-            for i in range(m):
-                d[0, i], d[1, i] = z[0, i], z[1, i]
+            copy_coordinates(z, d)
         else:
             read_displacement(tables, place, tangent)
             if strikes:
                 strike_motion(reduced, modes.has_states, trail.given[k], trail.rate[k], tangent)
             enter_displacement(tables, next_place, cosine_rate, sine_rate, tangent)
         if shift != 0.0:
-            read_begun(trail, k + 1, z)
+            copy_coordinates(trail.begun[k + 1], z)
             add_rate(-shift, modes.exponent[following], modes.drift[following], z, d)
         forced = tables.n_eigenmode[next_place]
         d[0, forced], d[1, forced] = 0.0, 0.0
@@ -199,13 +199,6 @@ def move(tables: ModeTables, place: int, n_tick: int, z: Floats) -> None:
     while left > 0:
         turn_on(min(left, most), power_re, power_im, z[0], z[1])
         left -= most
-
-
-@jit_lean_sum
-def read_begun(trail: Trail, piece: int, z: Floats) -> None:
-    """Coordinates (2, m) with which a piece begins."""
-    for i in range(z.shape[1]):
-        z[0, i], z[1, i] = trail.begun[piece, 0, i], trail.begun[piece, 1, i]
 
 
 @jit_inline_sum
@@ -277,7 +270,8 @@ def strike(reduced: Reduced, has_states: bool, impulse: Floats, rate: Floats, ta
     friction. `impulse` (2, q) are the normal and tangential impulses, `rate` (2, q) are gap rates and slips
     after the impact, and `tangent.rate` the change of gap rates and slips by the displacement.
     """
-    q, active, share = reduced.radius.size, tangent.active, tangent.share
+    q, active, share, compliance = reduced.radius.size, tangent.active, tangent.share, tangent.compliance
+    gap, slip = reduced.gap_jacobian, reduced.slip
     tangent.given[:] = 0.0
     largest = 0.0
     for i in range(q):
@@ -302,18 +296,14 @@ def strike(reduced: Reduced, has_states: bool, impulse: Floats, rate: Floats, ta
         if active[j]:
             for i in range(q):
                 if active[i]:
-                    tangent.compliance[i, j] = along(
-                        reduced, has_states, reduced.gap_jacobian[i], j, share[j]
-                    )
+                    compliance[i, j] = along(reduced, has_states, gap[i], j, share[j])
                     if active[q + i]:
-                        tangent.compliance[q + i, j] = along(
-                            reduced, has_states, reduced.slip[i], j, share[j]
-                        )
+                        compliance[q + i, j] = along(reduced, has_states, slip[i], j, share[j])
                     if active[q + j]:
-                        tangent.compliance[i, q + j] = product(reduced.gap_jacobian[i], reduced.slip[j])
+                        compliance[i, q + j] = product(gap[i], slip[j])
                         if active[q + i]:
-                            tangent.compliance[q + i, q + j] = product(reduced.slip[i], reduced.slip[j])
-    if not solve_active(tangent.compliance, tangent.speed, active, tangent.found, tangent.elimination):
+                            compliance[q + i, q + j] = product(slip[i], slip[j])
+    if not solve_active(compliance, tangent.speed, active, tangent.found, tangent.elimination):
         return
     for i in range(q):
         if active[i]:

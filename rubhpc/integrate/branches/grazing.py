@@ -32,11 +32,7 @@ CERTAIN = 3.0  # times the error of a secant, by which a trial stays short of it
 MISPLACED = 1e-4  # of its length, allowed deviation of a trial
 MOST_TRIALS = 40
 CLOSE = 1e-4  # steps before a grazing at which its point may lie
-BESIDE = (
-    1e-3,
-    1e-2,
-    0.1,
-)  # shares of a step from a grazing, at which the motion with more contacts is sought
+BESIDE = 1e-3, 1e-2, 0.1  # shares of a step from a grazing, at which the motion with more contacts is sought
 MISSED = 1e-4  # of a step, or of a gap, that may be left where it is taken to vanish
 MEETING, NEIGHBOURS = 0.5, 2.0  # of a step, within which the motions on both sides of a grazing lie
 WITHIN_REACH = 3.0  # steps, in which a distance to grazing would vanish

@@ -10,12 +10,7 @@ from rubhpc.fem.statics import sag_at_stators
 from rubhpc.integrate.marches.contact_sets import ContactSets
 from rubhpc.integrate.marches.march import ALL_SAMPLES
 from rubhpc.integrate.marches.met_modes import MetModes, NoClosedForm
-from rubhpc.kernels.case_progress import (
-    FINISHED,
-    MODE_WANTED,
-    PAUSED,
-    restart_clock,
-)
+from rubhpc.kernels.case_progress import FINISHED, MODE_WANTED, PAUSED, restart_clock
 from rubhpc.kernels.contact_event import event_work
 from rubhpc.kernels.contact_modes import DYING
 from rubhpc.kernels.event_loop import advance
@@ -40,7 +35,6 @@ if TYPE_CHECKING:
     from rubhpc.kernels.transitions import Transitions
 
     Floats = NDArray[np.float64]
-
 
 LOST, LEAST = 100.0, 1e-10  # of the overlap that is allowed; m
 MOST_STEPS = 20.0  # of a piece, over those of short steps: with more, its events have no end
