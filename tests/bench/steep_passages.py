@@ -18,9 +18,16 @@ import numpy as np
 TESTS = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(TESTS / "integrate" / "changing_speed"), str(TESTS / "support")]
 
-from test_steep_run_ups import PER_REVOLUTION, PROBES, RUB, error, machine, stepped  # noqa: E402
+from test_steep_run_ups import (  # noqa: E402
+    PER_REVOLUTION,
+    PROBES,
+    RUB,
+    error,
+    machine,
+    stepped,
+    without_contact,
+)
 
-from rubhpc import run_up  # noqa: E402
 from rubhpc.integrate.case import run_case  # noqa: E402
 from rubhpc.integrate.changing_speed.case import record_run_up  # noqa: E402
 from rubhpc.integrate.setup import prepare  # noqa: E402
@@ -52,15 +59,7 @@ def seconds_of(integrate, speed, recording, *law):
 
 def print_errors(law):
     """Errors of a passage without contact."""
-    rig, expected = machine(), stepped(machine(), law)
-    found = run_up(
-        rig,
-        speed_law=list(zip(law.time, law.speed, strict=True)),
-        clearance=1.0,
-        friction=0.0,
-        probes=PROBES,
-        samples_per_revolution=PER_REVOLUTION,
-    )
+    found, expected = without_contact(machine(), law), stepped(machine(), law)
     for probe, signal in zip(PROBES, expected, strict=True):
         own = found[f"probe_{probe.name}"].values
         worst = np.abs(own - signal).max() / np.abs(signal).max()

@@ -121,29 +121,6 @@ def test_pair_of_forces_is_in_balance(angle, whirl, friction):
     assert force_direction @ velocity == pytest.approx(gap_jacobian @ velocity - friction * slip, abs=1e-12)
 
 
-def test_held_degrees_stand_still():
-    pairs = make_pairs(0.4)
-    pairs.row[0, LATERAL] = pairs.row[0, W] = -1
-    work = workspace(pairs, STEP)
-    displacement = np.full(N_DEGREE, 2e-4)
-    is_closed = is_any_closed(
-        pairs.row,
-        pairs.axis_y,
-        pairs.axis_z,
-        pairs.radius,
-        pairs.clearance,
-        pairs.aside,
-        False,
-        displacement,
-        work.at,
-        work.gap,
-    )
-    assert work.at[0].tolist() == [2e-4, 0.0, 2e-4, 2e-4, 0.0]
-    gap = line_of_centres(np.exp(0.4j), work.at[0])
-    assert work.gap[0] == pytest.approx((gap * np.exp(-0.4j)).real - RADIUS)
-    assert is_closed == (work.gap[0] < 0)
-
-
 def closed(pairs, displacement):
     """The workspace when the free update leads to `displacement` (5 q,)."""
     work = workspace(pairs, STEP)
@@ -160,6 +137,16 @@ def closed(pairs, displacement):
         work.gap,
     )
     return work, is_closed
+
+
+def test_held_degrees_stand_still():
+    pairs = make_pairs(0.4)
+    pairs.row[0, LATERAL] = pairs.row[0, W] = -1
+    work, is_closed = closed(pairs, np.full(N_DEGREE, 2e-4))
+    assert work.at[0].tolist() == [2e-4, 0.0, 2e-4, 2e-4, 0.0]
+    gap = line_of_centres(np.exp(0.4j), work.at[0])
+    assert work.gap[0] == pytest.approx((gap * np.exp(-0.4j)).real - RADIUS)
+    assert is_closed == (work.gap[0] < 0)
 
 
 def flexible(rng, q):

@@ -113,11 +113,8 @@ class Killed(BaseException):
     """The process ends here."""
 
 
-@pytest.mark.parametrize("moments", [(1,), (70, 71), (90, 20, 40)])
-def test_kills_on_any_level_change_nothing(tmp_path, physics, moments):
-    whole = study_of(tmp_path, "whole", keep='["section"]')
-    run(whole, quiet=True)
-    study = study_of(tmp_path, keep='["section"]')
+def run_with_kills(study, physics, moments):
+    """Run a study to its end, killed each time that it has computed as many cases as `moments` state."""
 
     def count_down():
         if physics.n_case == end:
@@ -130,6 +127,14 @@ def test_kills_on_any_level_change_nothing(tmp_path, physics, moments):
             run(study, quiet=True)
     end = -1
     run(study, quiet=True)
+
+
+@pytest.mark.parametrize("moments", [(1,), (70, 71), (90, 20, 40)])
+def test_kills_on_any_level_change_nothing(tmp_path, physics, moments):
+    whole = study_of(tmp_path, "whole", keep='["section"]')
+    run(whole, quiet=True)
+    study = study_of(tmp_path, keep='["section"]')
+    run_with_kills(study, physics, moments)
     assert stored_bytes(study.output) == stored_bytes(whole.output)
 
 
@@ -387,18 +392,7 @@ def test_blocks_found_damaged_are_completed_by_any_ranks(tmp_path, physics):
 @pytest.mark.parametrize("moments", [(1,), (60, 20, 9)])
 def test_kills_within_slabs_change_nothing(tmp_path, physics, by_levels, moments):
     study = slabs_of(tmp_path)
-
-    def count_down():
-        if physics.n_case == end:
-            raise Killed
-
-    physics.on_case = count_down
-    for n_case in moments:
-        end = physics.n_case + n_case
-        with pytest.raises(Killed):
-            run(study, quiet=True)
-    end = -1
-    run(study, quiet=True)
+    run_with_kills(study, physics, moments)
     assert stored_bytes(study.output) == by_levels[0]
 
 
