@@ -134,6 +134,21 @@ class _KernelCode(JITCodeLibrary):
         passes, *builder = found if isinstance(found, tuple) else (found,)
         passes.run(self._final_module, *builder)
 
+    def _finalize_final_module(self) -> None:
+        """Keep to this kernel what is linked into it.
+
+        Kernels that were compiled in different processes may name different code alike; that of the one which
+        is loaded first would serve both. What other kernels link is taken before.
+        """
+        linked, module = self._final_module.clone(), self._final_module
+        for function in module.functions:
+            if function.linkage.name == "linkonce_odr":
+                function.linkage = "internal"
+        super()._finalize_final_module()
+        self._final_module = linked
+        self._get_module_for_linking()
+        self._final_module = module
+
 
 class _LinkedCode(_KernelCode):
     """Code that is linked into kernels and never runs by itself: no machine code is generated for it."""

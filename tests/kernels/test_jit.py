@@ -17,6 +17,7 @@ from running import ROOT, environment
 
 from rubhpc.kernels import _jit
 from rubhpc.kernels._compiler import KernelCompiler
+from rubhpc.kernels.contact_modes import add_rows
 
 CALLEE = """
 from probe._jit import {flavour}
@@ -136,6 +137,28 @@ def test_what_only_kernels_call_gets_no_machine_code(monkeypatch):
     assert quadrupled(1.5) == 6.0
     assert "quadrupled" in made
     assert "doubled" not in made
+
+
+@_jit.jit
+def add_rows_twice(rows, value, target):
+    add_rows(rows, value, target)
+    add_rows(rows, target, value)
+
+
+def test_what_is_linked_into_a_kernel_is_its_own(monkeypatch):
+    """Otherwise another kernel's copy of that name serves both, if it is loaded first."""
+    value, target = np.array([1.0, 2.0]), np.zeros(2)
+    monkeypatch.setattr(add_rows_twice._cache, "load_overload", lambda *_: None)
+    add_rows_twice(np.eye(2), value, target)
+    assert target.tolist() == [1.0, 2.0]
+    assert value.tolist() == [2.0, 4.0]
+    (compiled,) = add_rows_twice.overloads.values()
+    code = compiled.library
+    linkages = [
+        function.linkage.name for function in code._final_module.functions if not function.is_declaration
+    ]
+    assert "linkonce_odr" not in linkages
+    assert "internal" in linkages
 
 
 def test_a_caller_waits_for_what_another_process_compiles():
