@@ -23,7 +23,7 @@ from rubhpc.kernels.curved_contact import (
     is_closed,
 )
 from rubhpc.kernels.curved_forces import evaluate, find_gaps
-from rubhpc.kernels.mode_change import product
+from rubhpc.kernels.mode_change import GAP_TOLERANCE, product
 
 Floats = NDArray[np.float64]
 
@@ -36,16 +36,12 @@ def enter_curved(
     reduced: Reduced,
     clock: Clock,
     found: int,
-    is_same: bool,
     progress: Progress,
     z: Floats,
     motion: Floats,
     work: CurvedWork,
 ) -> bool:
-    """Enter contact mode `found` with the reduced motion (2 n,); False where no forces are found.
-
-    `is_same`: the motion has not left it, and its modes follow the speed (`contact_modes.enter_rest`).
-    """
+    """Enter contact mode `found` with the reduced motion (2 n,); False where no forces are found."""
     q, n = reduced.gap_jacobian.shape
     closed = int(tables.mask[found])
     for i in range(q):
@@ -58,17 +54,7 @@ def enter_curved(
             for k in range(n):
                 motion[k] += curved.shift[found, i, k] * work.h[0, i]
                 motion[n + k] += curved.shift[found, i, k] * work.rate[0, i]
-    if is_same:
-        enter_rest(
-            tables.motion_re[found],
-            tables.motion_im[found],
-            tables.enter_re[found],
-            tables.enter_im[found],
-            motion,
-            z,
-        )
-    else:
-        enter_keeping(tables, reduced, clock, found, progress.tick, z, motion, work)
+    enter_keeping(tables, reduced, clock, found, progress.tick, z, motion, work)
     progress.mode, progress.wanted, progress.entered = found, NONE, progress.tick
     progress.resolved_level, progress.halving_level, progress.is_after_event = FORCED_LEVEL, NONE, 1
     progress.contact_age = NONE
@@ -101,6 +87,15 @@ def enter_keeping(
     for k in range(z.shape[1]):
         before[0, k], before[1, k] = z[0, k], z[1, k]
     enter(tables, found, reduced.clearance, cosine, sine, motion, z)
+    if reduced.overlap > GAP_TOLERANCE:
+        enter_rest(
+            tables.motion_re[found],
+            tables.motion_im[found],
+            tables.enter_re[found],
+            tables.enter_im[found],
+            motion,
+            z,
+        )
     for k in range(tables.n_eigenmode[found]):
         if slowest > 0.0 and (pace[k] > slowest or pace[k] == DYING):
             z[0, k], z[1, k] = before[0, k], before[1, k]

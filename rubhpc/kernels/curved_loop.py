@@ -58,7 +58,6 @@ from rubhpc.kernels.curved_search import (
 from rubhpc.kernels.curved_step import follow_loads, go_on, take_step
 from rubhpc.kernels.event_steps import choose_step, contact_age, end_record, longest_step, sample_step
 from rubhpc.kernels.measuring import begin_span
-from rubhpc.kernels.mode_change import GAP_TOLERANCE
 from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
 
 if TYPE_CHECKING:
@@ -107,18 +106,13 @@ def advance_curved(
     progress.halving_level, progress.is_after_event = NONE, 0
     due = int(np.int64(NONE))  # ticks until a closed contact is expected to end, or another pair to touch
     groping = int(np.int64(0))  # level of the next step after that
-    is_begun = progress.wanted < 0
     while True:
         if progress.wanted >= 0:
             found = find_mode(mask, progress.wanted)
             if found < 0:
                 return MODE_WANTED
-            is_same = is_begun and found == progress.mode and reduced.overlap > GAP_TOLERANCE
-            if not enter_curved(
-                tables, curved, pairs, reduced, clock, found, is_same, progress, z, motion, work
-            ):
+            if not enter_curved(tables, curved, pairs, reduced, clock, found, progress, z, motion, work):
                 return CONTACT_UNSOLVED
-            is_begun = True
         mode = progress.mode
         closed = int(mask[mode])
         if is_recorded and progress.energy_from < 0:

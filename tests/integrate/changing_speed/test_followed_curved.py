@@ -25,11 +25,14 @@ def apart(found, other, name):
 
 
 def test_without_contact_the_normal_does_not_matter():
-    """Matrices held in ranges, about one sag each, erred by 6e-4 in bearing forces, 2e-2 in soft bearings."""
+    """Matrices held in ranges, about one sag each, erred by 6e-4 in bearing forces, 2e-2 in soft bearings.
+
+    Pieces begin alike but for the rest that entering a mode leaves (`contact_modes.enter_rest`).
+    """
     given = LAW | {"clearance": 1.0, "probes": PROBES}
     found, other = (run_up(machine(), **given, normal=normal) for normal in ("updated", "fixed"))
     for name in ("vertical", "horizontal", "probe_at_1", "probe_at_7"):
-        assert apart(found, other, name) < 1e-10, name
+        assert apart(found, other, name) < 1e-6, name
 
 
 def test_a_round_rim_in_a_ring_moves_as_in_short_steps(monkeypatch):
