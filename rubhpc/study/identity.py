@@ -25,7 +25,7 @@ PHYSICS = 25  # version of the physics: raised whenever a study gives other resu
 # Versions of what only some studies take, raised in place of PHYSICS and added to it for these.
 MODAL = 8  # method = "modal": modes kept, resolution of events, and last bits of multipliers and exponents
 DIRECT = 10  # transient = "direct"
-CHANGING_SPEED = 38  # run-ups and drives
+CHANGING_SPEED = 39  # run-ups and drives
 COULOMB = 27  # set-valued friction
 PENALTY = 1  # method = "modal" with a penalty, for whose sake modes are kept
 SOFT_FRICTION = 1  # a penalty with set-valued friction

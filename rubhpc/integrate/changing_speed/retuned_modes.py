@@ -163,10 +163,10 @@ class RetunedLibrary(HeldModes):
     def tuned(self, met: set[int]) -> Ints:
         """Sets of closed pairs of the tables that are tuned to this piece or to later ones, of those met."""
         found = np.full(len(self.masks), NOT_TUNED)
-        for mask, place in self._place.items():
+        for mask, end in self._tuned.items():
             if mask in met:
-                first = place - self._window
-                found[first + self._at : first + self._tuned.get(mask, 0)] = mask
+                first = self._place[mask] - self._window
+                found[first + self._at : first + end] = mask
         return found
 
     def _take_desk(self) -> None:

@@ -14,8 +14,9 @@ CASE = {"start": 320.0, "stop": 332.0, "time": 0.18, "clearance": 1.2e-4, "frict
 SIGNALS = "vertical", "torsion", "probe_twist", "probe_impeller"
 
 
+@pytest.mark.parametrize("per_revolution", [None, 16])  # by default blocks have few pieces
 @pytest.mark.parametrize("law", [{}, {"friction_law": "coulomb"}], ids=["sliding", "coulomb"])
-def test_fewer_pieces_at_once_give_the_same_run_up(law, monkeypatch):
+def test_fewer_pieces_at_once_give_the_same_run_up(law, per_revolution, monkeypatch):
     rig, found, rooms = replace(pump(), stator=TIPS), [], []
     room_of = retuned_modes.RetunedLibrary._n_room_of
 
@@ -28,7 +29,8 @@ def test_fewer_pieces_at_once_give_the_same_run_up(law, monkeypatch):
         monkeypatch.setattr(retuned_modes, "MOST_BYTES", most)
         pieces._KNOWN.clear()  # matrices with tables for as many pieces as before
         speed_ranges._DESKS.clear()
-        found.append(run_up(rig, **CASE, **law, probes=PROBES, samples_per_revolution=64))
+        case = CASE | law | {"pieces_per_revolution": per_revolution}
+        found.append(run_up(rig, **case, probes=PROBES, samples_per_revolution=64))
     assert found[0].contact_fraction.max() > 0.0
     assert rooms[0] > min(rooms[1:-1]) > rooms[-1] == 1
     for other in found[1:]:
