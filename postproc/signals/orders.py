@@ -25,6 +25,8 @@ WHOLE = 0.02  # of a revolution: by how much an order may miss a whole number of
 NEAR = 1e-3  # of an order, within which a run-up follows it
 JUMP = 0.25 * np.pi  # rad a revolution, faster than the phase of an order of a window of six goes
 WINDOW = 6  # revolutions over which orders of a run-up are taken (`spectra.track_orders`)
+SILENT = 1e-9  # of the largest amplitude of a signal, below which it is rounding and has no phase
+NOTHING = 1e-15  # the same where the largest is no more, in the SI unit of the signal
 AROUND = 4  # revolutions on either side of a jump in which there is no phase
 _FIRST_LAG = 120.0  # degrees
 
@@ -52,6 +54,7 @@ def order_over_speed(
         shaft's angle, unwrapped, over `speed` (rad/s), rising, and `over`; of run-ups over `revolution`, with
         `speed` as a variable. Where the phase of a run-up jumps, the order is lost in other motion, and the
         phase is NaN; so are both at its ends, in revolutions that have the window of a later or earlier one.
+        Where there is no more of the order than rounding, it has no phase either.
 
     Raises
     ------
@@ -69,8 +72,9 @@ def order_over_speed(
     if along == "speed":
         found = found.sortby("speed")
     for signal in signals:
-        phase = found[f"phase_{signal}"]
-        values = phase.values
+        phase, size = found[f"phase_{signal}"], found[f"amplitude_{signal}"].values
+        silent = max(SILENT * float(np.nanmax(size, initial=0.0)), NOTHING)
+        values = np.where(size > silent, phase.values, np.nan)
         if along == "revolution":
             values = np.apply_along_axis(_without_jumps, phase.get_axis_num(along), values)
         unwrapped = np.apply_along_axis(_unwrap, phase.get_axis_num(along), values)
