@@ -14,6 +14,7 @@ from postproc.signals.orders import order_over_speed, written_lag
 from postproc.store.run_ups import is_run_up
 from postproc.store.units import short_name
 from postproc.store.variables import require_results
+from rubhpc.errors import InputError
 from rubhpc.fem.separation_margin import response_peaks
 from rubhpc.units import scale_for
 
@@ -31,7 +32,11 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 LEAST_LAG = 45.0  # degrees by which the lag grows between the half-power points of a resonance, half of 90
-ROOM = 0.2  # of the width of a plot, between two peaks that are named
+# Width of a peak at half power, of the root of the acceleration (Hz, from Hz/s): that of a resonance is some
+# 0.9 at least, however small the damping, that of a beat 0.4 at most (half a turn of Fresnel's integral).
+LEAST_WIDTH = 0.6
+ROOM = 0.28  # of the width of a plot, between two peaks that are named
+_DASHES = ("-", (0, (4, 1.5)), (0, (1, 1)), (0, (4, 1, 1, 1)))  # of signals, where colours are those of cases
 
 
 def bode(
@@ -58,6 +63,7 @@ def bode(
     shown = order_over_speed(cases, signals, order, over)
     for name in signals:
         require_results(shown[f"amplitude_{name}"], cases)
+    _require_one_unit(shown, signals)
 
     speeds = shown["speed"].values
     critical = critical_speeds(cases, float(np.nanmin(speeds)), float(np.nanmax(speeds)))
@@ -66,6 +72,14 @@ def bode(
         draw_bode(shown, signals, axes, order, critical)
 
     return Drawing(shown=shown, draw=draw, panels=(2, 1), height=90)
+
+
+def _require_one_unit(shown: xr.Dataset, signals: Sequence[str]) -> None:
+    """Check that signals share an ordinate; InputError where not."""
+    units = {name: str(shown[f"amplitude_{name}"].attrs.get("units", "1")) for name in signals}
+    if len(set(units.values())) > 1:
+        written = ", ".join(f"{name} ({unit})" for name, unit in units.items())
+        raise InputError(f"{written}: have different units; draw those of each unit in a figure of their own")
 
 
 def draw_bode(
@@ -86,9 +100,11 @@ def draw_bode(
     is_sparse = data.sizes[along] < 40
     over = next((dim for dim in data[f"amplitude_{signals[0]}"].dims if dim != along), None)
     style: dict[str, Any] = {"marker": "." if is_sparse else "", "markersize": 4, "linewidth": 0.8}
-    n_curve = 0
+    n_case = data.sizes[over] if over else 1
+    if n_case > 1 and len(signals) > len(_DASHES):
+        raise InputError(f"{len(signals)} signals of several cases cannot be distinguished; select one case")
     peaks: list[tuple[ResponsePeak, Line2D]] = []
-    for name in signals:
+    for i_signal, name in enumerate(signals):
         amplitude, phase = data[f"amplitude_{name}"], data[f"phase_{name}"]
         curves = zip(overlaid(amplitude, along), overlaid(phase, along), strict=True)
         before: tuple[Floats, Floats] | None = None
@@ -97,14 +113,16 @@ def draw_bode(
             rpm = own_speeds.values * RPM
             own = name.removeprefix("probe_").replace("_", " ") if len(signals) > 1 else None
             label = ", ".join(text for text in (own, case) if text) or None
+            if n_case > 1:
+                style |= {"color": f"C{i_case}", "linestyle": _DASHES[i_signal]}
             (curve,) = top.plot(rpm, height.values * scale.factor, label=label, **style)
             lag = written_lag(lead.values, rpm, before)
             before = rpm, lag
             if order == 1.0:
-                found = peaks_of(own_speeds.values, height.values * scale.factor, lag)
+                is_swept = along == "revolution"
+                found = peaks_of(own_speeds.values, height.values * scale.factor, lag, is_swept)
                 peaks += [(peak, curve) for peak in found]
             bottom.plot(rpm, lag, **style)
-            n_curve += 1
     shown = [signal_name(data[f"amplitude_{signals[0]}"])] if len(signals) == 1 else []
     top.set_title(", ".join([*shown, written_order(order)]), fontsize=8)
     top.set(ylabel=scale.label("Amplitude, 0\N{EN DASH}peak"), xlim=ends)
@@ -114,32 +132,46 @@ def draw_bode(
         line: dict[str, Any] = {"color": "0.6", "linewidth": 0.6, "linestyle": (0, (4, 3)), "zorder": 0.5}
         top.axvline(speed * RPM, label=None if i else written_speeds(critical), **line)
         bottom.axvline(speed * RPM, **line)
-    if n_curve > 1 or critical:
+    if len(signals) * n_case > 1 or critical:
         place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.2), "ncols": 2}
         bottom.legend(*top.get_legend_handles_labels(), fontsize=6, frameon=False, **place)
     bottom.set(xlabel="Spin speed (rpm)", ylabel="Phase lag (\N{DEGREE SIGN})")
-    bottom.invert_yaxis()
-    bottom.yaxis.set_major_locator(degree_steps(bottom))
+    if any(np.isfinite(line.get_ydata()).any() for line in bottom.lines[: len(signals) * n_case]):
+        bottom.invert_yaxis()
+        bottom.yaxis.set_major_locator(degree_steps(bottom))
+    else:
+        _name_lost_phase(bottom, written_order(order))
     bottom.ticklabel_format(axis="x", style="plain", useOffset=False)
     top.figure.align_ylabels(axes)
 
 
-def peaks_of(speed: Floats, height: Floats, lag: Floats) -> list[ResponsePeak]:
+def _name_lost_phase(ax: Axes, order: str) -> None:
+    """Say in the panel of the phase why it is empty."""
+    ax.set_yticks([])
+    words = f"{order} is none, or lost in other motion: no phase"
+    ax.text(0.5, 0.5, words, transform=ax.transAxes, ha="center", va="center", fontsize=6, color="0.35")
+
+
+def peaks_of(speed: Floats, height: Floats, lag: Floats, is_swept: bool = False) -> list[ResponsePeak]:
     """Resonances of an amplitude (n,) with a lag (n,), degrees, over rising or falling speeds (n,), rad/s.
 
     The amplitude falls to 0.707 of a peak on both sides, and the lag grows by `LEAST_LAG` between these.
+    Where the speed `is_swept`, one value a revolution, beats with what rings behind a resonance are left out.
     """
+    least = LEAST_WIDTH * np.sqrt(abs(np.gradient(speed)) * speed) if is_swept and speed.size > 1 else None
     known = np.isfinite(speed) & np.isfinite(height)
     speed, height, lag = speed[known], height[known], lag[known]
+    least = np.zeros_like(speed) if least is None else least[known]
     steps = np.diff(speed)
     if speed.size < 3 or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
         return []
     rising = np.argsort(speed)
-    speed, height, lag = speed[rising], height[rising], lag[rising]
+    speed, height, lag, least = speed[rising], height[rising], lag[rising], least[rising]
     found = []
     for peak in response_peaks(lambda at: float(np.interp(at, speed, height)), speed):
         below, above = np.interp(peak.half_power_speeds, speed, lag)
-        if above - below >= LEAST_LAG:  # not so where one of them is unknown
+        is_wide = np.ptp(peak.half_power_speeds) >= np.interp(peak.speed, speed, least)
+        if is_wide and above - below >= LEAST_LAG:  # not so where one of them is unknown
             found.append(peak)
     return found
 
@@ -158,7 +190,9 @@ def _name_peaks(ax: Axes, peaks: Sequence[tuple[ResponsePeak, Line2D]]) -> None:
         taken.append(rpm)
         words = f"{rpm:.0f} rpm, AF {peak.amplification_factor:.3g}"
         top = max(float(np.nanmax(y[abs(x - rpm) < 0.6 * room], initial=peak.amplitude)) for x, y in curves)
-        place: dict[str, Any] = {"xytext": (0, 2), "textcoords": "offset points", "ha": "center"}
+        share = (rpm - ax.get_xlim()[0]) / np.ptp(ax.get_xlim())
+        side = "left" if share < 0.5 * ROOM else "right" if share > 1.0 - 0.5 * ROOM else "center"
+        place: dict[str, Any] = {"xytext": (0, 2), "textcoords": "offset points", "ha": side}
         behind = {"facecolor": "white", "edgecolor": "none", "pad": 0.5}
         ax.annotate(words, (rpm, top), va="bottom", fontsize=6, color=line.get_color(), bbox=behind, **place)
         ax.set_ylim(top=max(ax.get_ylim()[1], 1.2 * top))

@@ -137,3 +137,35 @@ def test_stretches_of_a_lag_lie_by_the_curve_drawn_before():
     down = written_lag(-np.radians(lag[::-1]), speed[::-1])
     assert down == pytest.approx(first[::-1])
     assert np.isnan(written_lag(np.full(11, np.nan), speed, (speed, first))).all()
+
+
+def test_beats_behind_a_resonance_are_no_peaks():
+    """An oscillator with little damping, its speed raised by 2 Hz/s through 20 Hz: it rings on and beats."""
+    rate, natural, damping, step = 2.0 * math.pi * 2.0, 2.0 * math.pi * 20.0, 0.004, 2e-4
+    time = step * np.arange(round(15.0 / step))
+    start = 2.0 * math.pi * 10.0
+    angle = start * time + 0.5 * rate * time**2
+    pole = natural * (1j * math.sqrt(1.0 - damping**2) - damping)
+    ringing = np.exp(pole * time) * np.cumsum(np.exp(1j * angle - pole * time)) * step  # of the near pole
+    turn = np.interp(2.0 * math.pi * np.arange(int(angle[-1] / (2.0 * math.pi))), angle, time)
+    response = np.interp(turn, time, ringing * np.exp(-1j * angle))
+    seen = start + rate * turn, abs(response), -np.degrees(np.unwrap(np.angle(response)))
+    assert len(peaks_of(*seen)) > 1
+    (peak,) = peaks_of(*seen, is_swept=True)
+    assert 1.0 < peak.speed / natural < 1.08
+
+
+def test_signals_of_different_units_share_no_ordinate():
+    data = study().isel(friction=0)
+    data = data.assign(torsion=data["vertical"].assign_attrs(units="rad"))
+    with pytest.raises(InputError, match=r"vertical \(m\), torsion \(rad\): have different units"):
+        bode(data, ["vertical", "torsion"])
+
+
+def test_an_order_that_is_not_there_has_no_phase():
+    """A case without contact has no torsion but rounding."""
+    data = study().isel(friction=0)
+    few = data.assign(torsion=(1e-18 * data["vertical"]).assign_attrs(units="rad"))
+    axes = bode(few, "torsion").show()
+    assert not np.isfinite(axes[1].lines[0].get_ydata()).any()
+    assert axes[1].texts[0].get_text() == "1X is none, or lost in other motion: no phase"
