@@ -13,6 +13,7 @@ from postproc.figures.run_up_marks import critical_speeds, draw_rotation, name_s
 from postproc.signals.orders import order_over_speed
 from postproc.store.run_ups import is_run_up
 from postproc.store.variables import probe_of, probes_of, require_results
+from rubhpc.errors import InputError
 from rubhpc.schema import PROBE
 from rubhpc.units import scale_for
 
@@ -47,6 +48,9 @@ def polar(
     """
     shown = order_over_speed(cases, (signal,), order, over)
     require_results(shown[f"amplitude_{signal}"], cases)
+    if not shown[f"phase_{signal}"].notnull().any():
+        problem = f"{written_order(order)} is none, or lost in other motion, and has no phase"
+        raise InputError(f"{signal}: {problem}; draw its amplitude with rubhpc bode")
     speeds = shown["speed"].values
     critical = critical_speeds(cases, float(np.nanmin(speeds)), float(np.nanmax(speeds)))
     angle = _seen_from(cases, signal)
@@ -73,7 +77,7 @@ def draw_polar(
     _draw_grid(ax, reach, angle, _emptiest(amplitude.values, phase.values))
     over = next((dim for dim in amplitude.dims if dim != along), None)
     pairs = zip(overlaid(amplitude, along), overlaid(phase, along), strict=True)
-    curves = []
+    curves, n_curve = [], 0
     for i_case, ((case, height), (_, lead)) in enumerate(pairs):
         own = speeds.isel({over: i_case}) if over in speeds.dims else speeds
         # Drawn as seen from the drive end: clockwise is the sense of spin, and a lead turns with it.
@@ -83,7 +87,9 @@ def draw_polar(
             height.values * scale.factor * np.cos(turned),
         )
         ax.plot(x, y, label=case, linewidth=0.9)
-        curves.append((x, y, own.values))
+        n_curve += 1
+        if np.isfinite(x).any():
+            curves.append((x, y, own.values))
     curves_by_reach = sorted(curves, key=lambda curve: -float(np.nanmax(np.hypot(curve[0], curve[1]))))
     name_speeds(ax, [(x, y) for x, y, _ in curves_by_reach], curves_by_reach[0][2])
     style: dict[str, Any] = {"marker": "D", "markersize": 4, "linestyle": "", "color": "k"}
@@ -92,11 +98,12 @@ def draw_polar(
         for speed in critical or []:
             if np.nanmin(at) <= speed <= np.nanmax(at):
                 i = int(np.nanargmin(np.abs(at - speed)))
-                ax.plot(x[i], y[i], markerfacecolor="white", **style)
-                passed.add(speed)
+                if np.isfinite(x[i]):
+                    ax.plot(x[i], y[i], markerfacecolor="white", **style)
+                    passed.add(speed)
     if passed:
         ax.plot([], [], label=written_speeds(passed), markerfacecolor="white", **style)
-    if len(curves) > 1 or passed:
+    if n_curve > 1 or passed:
         ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.01), ncols=2, frameon=False, fontsize=6)
     draw_rotation(ax)
     ax.set_title(

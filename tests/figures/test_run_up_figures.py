@@ -142,6 +142,13 @@ def test_there_is_no_phase_where_an_order_is_lost_in_other_motion():
     assert (lag[45:-2] - lag[44]) == pytest.approx(np.degrees(0.5) * np.arange(TURNS - 47))
 
 
+def test_an_order_without_a_phase_has_no_polar_plot():
+    passed = run_up()
+    passed["phase_probe_left"][:, 1] = np.arange(TURNS) * 1.0  # rad a revolution
+    with pytest.raises(InputError, match="probe_left: 1X is none, or lost in other motion, and has no phase"):
+        polar(passed, "probe_left")
+
+
 @pytest.mark.parametrize("turns", [0.7, 1.6, 3.0])
 def test_speeds_are_written_beside_curve_and_one_another(turns):
     """A spiral, whose ends and bends are where labels would fall on the curve."""
