@@ -103,8 +103,8 @@ def run_up(
         (m/s), below 0 where steady sliding does not hold; and over `revolution` and `order` the amplitude
         (zero to peak) and phase of the displacements of the disc, its torsion and the probes, over six
         revolutions: `amplitude_vertical`, `phase_vertical` (rad, by which the signal leads the order of the
-        shaft's angle), and so on. A case that ends early says why in the attribute `reason`; what is wrong
-        with its result is in `note`.
+        shaft's angle), and so on. `clearance` and `friction` are coordinates. A case that ends early says why
+        in the attribute `reason`; what is wrong with its result is in `note`.
 
     Raises
     ------
@@ -177,7 +177,12 @@ def run_up(
             "last_speed": found.last_speed,
             "energy_residual": found.energy_residual,
         }
-    return _dataset(variables, len(found.speed), samples_per_revolution, attributes)
+    settings = {
+        "clearance": ((), one.clearance, _about("m", VARIABLES["clearance"].long_name)),
+        "friction": ((), one.friction, _about("1", "friction coefficient")),
+    }
+    passage = _dataset(variables, len(found.speed), samples_per_revolution, attributes)
+    return passage.assign_coords(settings)
 
 
 def _read_drive(drive: Mapping[str, object]) -> DriveLaw:

@@ -9,6 +9,7 @@ import numpy as np
 
 from postproc.figures.drawing import Drawing
 from postproc.figures.overlay import overlaid
+from postproc.figures.run_up_marks import title_speeds
 from postproc.figures.small_multiples import legend_below
 from postproc.signals.spectra import samples_per_revolution
 from postproc.signals.waveforms import orbit_data
@@ -52,8 +53,7 @@ def orbit(
 
     def draw(axes: list[Axes]) -> None:
         draw_orbit(shown, axes[0])
-        if over is None:
-            legend_below(axes[0], axes[0].get_legend_handles_labels()[0])
+        legend_below(axes[0], axes[0].get_legend_handles_labels()[0])
 
     return Drawing(shown=shown, draw=draw, height=80)
 
@@ -78,7 +78,7 @@ def draw_orbit(data: xr.Dataset, ax: Axes) -> Axes:
         curves = zip(overlaid(vertical, "sample"), overlaid(horizontal, "sample"), strict=True)
         for (name, y), (_, z) in curves:
             ax.plot(z.values * scale.factor, y.values * scale.factor, linewidth=0.5, label=name)
-        ax.legend(loc="upper right")
+    title_speeds(data, ax)
     ax.set_aspect("equal", adjustable="datalim")
     ax.locator_params(nbins=6)
     ax.set(xlabel=scale.label(_name(horizontal)), ylabel=scale.label(_name(vertical)))

@@ -63,6 +63,13 @@ def written_speeds(speeds: Iterable[float]) -> str:
     return f"critical speed{'s' if len(numbers) > 1 else ''}, {', '.join(numbers)} rpm"
 
 
+def title_speeds(data: xr.Dataset, ax: Axes) -> None:
+    """Name the speeds of a waveform or an orbit of a run-up above it."""
+    if "spin_speeds" in data.attrs:
+        first, last = (f"{RPM * speed:.0f}" for speed in data.attrs["spin_speeds"])
+        ax.set_title(f"{first} rpm" if first == last else f"{first} to {last} rpm", fontsize=7)
+
+
 def name_speeds(
     ax: Axes, curves: Sequence[tuple[Floats, Floats]], speed: Floats, apart: float = APART
 ) -> None:

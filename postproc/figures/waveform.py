@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from textwrap import fill
 from typing import TYPE_CHECKING
 
@@ -9,12 +10,15 @@ import numpy as np
 
 from postproc.figures.drawing import Drawing
 from postproc.figures.overlay import overlaid
+from postproc.figures.run_up_marks import title_speeds
+from postproc.figures.small_multiples import legend_below
 from postproc.signals.waveforms import DEFAULT_SIGNALS, waveform_data
 from postproc.store.units import displayed, scale_of, short_name
 from postproc.store.variables import require_results
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from re import Match
 
     import xarray as xr
     from matplotlib.axes import Axes
@@ -22,6 +26,7 @@ if TYPE_CHECKING:
     from postproc.figures.options import Axis, Count
 
 _LABEL_WIDTH = 18  # characters that fit next to a low panel
+_UNIT = re.compile(r"\(.*\)$")
 
 
 def waveform(
@@ -58,6 +63,8 @@ def draw_waveform(signal: xr.DataArray, ax: Axes) -> Axes:
     require_results(signal, signal.to_dataset())
     scale = scale_of(signal)
     x, x_label = displayed(_abscissa(signal))
+    if x[0] < 0.0:
+        x_label = "Revolution, from the end"
     for name, curve in overlaid(signal, "sample"):
         ax.plot(x, curve.values * scale.factor, label=name)
     ax.set(xlim=(x[0], x[-1]), xlabel=x_label, ylabel=scale.label(short_name(signal)))
@@ -71,16 +78,16 @@ def draw_panels(data: xr.Dataset, axes: Sequence[Axes]) -> list[Axes]:
     signals = [str(n) for n, v in data.data_vars.items() if "sample" in v.dims]
     for ax, name in zip(axes, signals, strict=True):
         draw_waveform(data[name], ax)
-        ax.set_ylabel(fill(ax.get_ylabel(), _LABEL_WIDTH), fontsize=7)
+        ax.set_ylabel(fill(_UNIT.sub(_unbroken, ax.get_ylabel()), _LABEL_WIDTH), fontsize=7)
         ax.label_outer()
         ax.locator_params(axis="y", nbins=4)
+        ax.locator_params(axis="x", nbins=5)
     axes[0].figure.align_ylabels(list(axes))
     if "contact_force" in data and data["contact_force"].ndim == 1:
         for ax in axes:
             shade_contacts(data["contact_force"], ax)
-    handles, labels = axes[0].get_legend_handles_labels()
-    if handles:
-        axes[0].figure.legend(handles, labels, loc="outside lower center", ncols=min(len(handles), 4))
+    title_speeds(data, axes[0])
+    legend_below(axes[0], axes[0].get_legend_handles_labels()[0])
     return list(axes)
 
 
@@ -91,6 +98,10 @@ def shade_contacts(force: xr.DataArray, ax: Axes) -> None:
     half = (x[1] - x[0]) / 2  # a sample is a mean over its interval
     for first, last in zip(np.flatnonzero(touching == 1), np.flatnonzero(touching == -1) - 1, strict=True):
         ax.axvspan(x[first] - half, x[last] + half, color="0.9", linewidth=0, zorder=0)
+
+
+def _unbroken(unit: Match[str]) -> str:
+    return unit[0].replace(" ", "\N{NO-BREAK SPACE}")
 
 
 def _abscissa(signal: xr.DataArray) -> xr.DataArray:

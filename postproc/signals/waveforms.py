@@ -6,9 +6,10 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from postproc.signals.carried import NEEDED, mean_shift
-from postproc.signals.spectra import check_signal, last_revolutions
+from postproc.signals.spectra import check_signal, samples_per_revolution
 from postproc.store.axes import find_axis, source
 from postproc.store.rig_of_case import is_carried
 from postproc.store.run_ups import is_run_up
@@ -20,9 +21,10 @@ from rubhpc.schema import PROBE
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import xarray as xr
+    from numpy.typing import NDArray
 
 _LEAST_SINE = 0.05  # of the angle between two probes: 3 degrees
+_ONE_SPEED = 2e-3  # by which the speeds of several cases may differ where one is named
 DEFAULT_SIGNALS = ("vertical", "horizontal", "torsion", "contact_force")
 
 
@@ -45,15 +47,14 @@ def waveform_data(
     -------
     Dataset
         The signals over `sample`, with the coordinate `revolution` and, where all cases turn at one speed,
-        `time` (s) from the first sample kept.
+        `time` (s) from the first sample kept. Of run-ups that differ in length, `revolution` counts from
+        the end of each.
     """
     for signal in signals:
         check_signal(signal)
     names = [*dict.fromkeys(signals), *(() if is_run_up(store) else ("spin_speed",))]
     data = narrow(store, names, [find_axis(store, over)] if over else [])
-    if revolutions is not None:
-        kept = last_revolutions(data[signals[0]], revolutions)
-        data = data.isel(sample=slice(-kept.sizes["sample"], None))
+    data = _last_of_each(store, data, revolutions, over)
     spin = np.unique(data["spin_speed"].values) if "spin_speed" in data else np.zeros(0)
     if spin.size == 1 and spin[0] > 0:
         time = (data["revolution"] - data["revolution"][0]) * (2 * math.pi / float(spin[0]))
@@ -87,14 +88,48 @@ def orbit_data(
         data = narrow(store, ["vertical", "horizontal", "clearance"], spread)
     else:
         data = seen_by_two(store, probes, spread)
-    if revolutions is not None:
-        kept = last_revolutions(data["vertical"], revolutions)
-        data = data.isel(sample=slice(-kept.sizes["sample"], None))
+    data = _last_of_each(store, data, revolutions, over)
     if probes is None and not spread and is_carried(data) and all(name in store for name in NEEDED):
-        tips = narrow(store, NEEDED, ["stator"]).isel(sample=slice(-data.sizes["sample"], None))
+        tips = _last_of_each(store, narrow(store, NEEDED, ["stator"]), revolutions, None)
         moved = zip(("carrier_vertical", "carrier_horizontal"), mean_shift(tips).T, strict=True)
         data = data.assign({name: ("stator", values, {"units": "m"}) for name, values in moved})
     return data
+
+
+def _last_of_each(
+    store: xr.Dataset, data: xr.Dataset, revolutions: int | None, over: str | None
+) -> xr.Dataset:
+    """Return the last revolutions of each case; of run-ups, which differ in length, before its own end."""
+    n = samples_per_revolution(data["revolution"])
+    if not is_run_up(store):
+        return data if revolutions is None else data.isel(sample=slice(-revolutions * n, None))
+    spread = [find_axis(store, over)] if over else []
+    speed = (narrow(store, ["speed"], spread) if "status" in store else store)["speed"]
+    turned = speed.notnull().sum("revolution").values
+    ends, longest = np.unique(turned[turned > 0]), data.sizes["sample"] // n
+    if ends.size and (kept := _speeds(speed, turned, revolutions or longest)):
+        data.attrs["spin_speeds"] = kept
+    if not ends.size or (revolutions is None and ends.size > 1):
+        return data
+    count = min(revolutions or longest, int(ends[0]))
+    if ends.size == 1:
+        return data.isel(sample=slice((int(ends[0]) - count) * n, int(ends[0]) * n))
+    before = {"sample": slice(0, count * n)}
+    shifts = xr.DataArray(count - turned, dims=spread)
+    rows = [
+        data.isel({spread[0]: i}).drop_vars("revolution").shift(sample=int(shift) * n).isel(before)
+        for i, shift in enumerate(shifts.values)
+    ]
+    place = np.arange(count * n) / n - count
+    about = {"units": "1", "long_name": "revolution, from the end"}
+    return xr.concat(rows, spread[0]).assign_coords(revolution=("sample", place, about))
+
+
+def _speeds(speed: xr.DataArray, turned: NDArray[np.int64], revolutions: int) -> list[float]:
+    """Mean speed of the first and last of the last revolutions, rad/s; [] where that of cases differs."""
+    rows, ends = np.atleast_2d(speed.values), np.atleast_1d(turned)
+    kept = [row[[max(end - revolutions, 0), end - 1]] for row, end in zip(rows, ends, strict=True) if end]
+    return kept[0].tolist() if np.allclose(kept, kept[0], rtol=_ONE_SPEED) else []
 
 
 def seen_by_two(

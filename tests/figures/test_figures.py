@@ -198,7 +198,7 @@ def test_poincare_points_are_one_a_revolution(case, ax):
 
 def test_orbits_along_an_axis_have_a_legend(store, ax):
     draw_orbit(orbit_data(select(store, rest("friction")), over="friction"), ax)
-    labels = [text.get_text() for text in ax.get_legend().get_texts()]
+    labels = ax.get_legend_handles_labels()[1]
     assert labels == [r"$\mu$ = 0.1", r"$\mu$ = 0.3"]
 
 

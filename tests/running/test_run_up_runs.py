@@ -127,6 +127,19 @@ def test_figures_of_one_case_see_its_signals(folder):
             spectrum(store, signal)
 
 
+def test_waveforms_end_with_their_own_case(folder):
+    """The store is as long as its longest case."""
+    store = rubhpc.open(folder / "run_ups.zarr").isel(clearance=1)
+    short, long = (waveform_data(store.isel(run_up_time=i), ["vertical"], 2) for i in (0, 1))
+    assert short["vertical"].notnull().all()
+    assert short["revolution"][0] < long["revolution"][0]
+    both = waveform_data(store, ["vertical"], 2, over="run_up_time")
+    assert both["revolution"].values[[0, -1]] == pytest.approx([-2.0, -1 / 32])
+    for i, alone in enumerate((short, long)):
+        assert (both["vertical"][i].values == alone["vertical"].values).all()
+    assert orbit(store.isel(run_up_time=0), revolutions=2).show().get_title(loc="left").endswith("rpm")
+
+
 @pytest.mark.parametrize("kind", ["csv", "parquet"])
 def test_revolutions_are_exported_as_rows(folder, tmp_path, kind):
     store, path = rubhpc.open(folder / "run_ups.zarr"), tmp_path / f"table.{kind}"
