@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from postproc.figures.options import Axis
 
 
+_LABEL = 0.35  # of the axis: width of a label
 _NEAR = 0.07  # of the axis: critical speeds that share a label
 
 
@@ -60,26 +61,26 @@ def draw_speed(data: xr.Dataset, axes: list[Axes], critical: Sequence[float] = (
     top.ticklabel_format(axis="y", style="plain", useOffset=False)
     if len(times) > 1:
         top.legend(loc="best", fontsize=6)
-    known = [case.values[np.isfinite(case.values)] for _, case in overlaid(data["speed"], "revolution")]
-    ends = np.array([case[[0, -1]] for case in known if case.size])
-    _draw_critical(top, RPM * np.array(sorted(critical)), RPM * ends)
+    _draw_critical(top, RPM * np.array(sorted(critical)))
     if "driving_torque" in data:
         _draw_torques(data, times, bottom)
     bottom.set_xlabel("Time (s)")
     top.figure.align_ylabels(axes)
 
 
-def _draw_critical(ax: Axes, speeds: NDArray[np.float64], ends: NDArray[np.float64]) -> None:
-    """Draw critical speeds, rpm; those too close together for a label each share one.
-
-    `ends` (n_case, 2) are the first and last speeds of the cases.
-    """
+def _draw_critical(ax: Axes, speeds: NDArray[np.float64]) -> None:
+    """Draw critical speeds, rpm, over the curves; those too close together for a label each share one."""
+    curves = np.concatenate([np.asarray(line.get_xydata()) for line in ax.lines])
+    share = curves[:, 0] / ax.get_xlim()[1]
+    at_left, at_right = (curves[there, 1] for there in (share < _LABEL, share > 1.0 - _LABEL))
     near = _NEAR * float(np.ptp(ax.get_ylim()))
     for value in speeds:
         ax.axhline(value, color="0.6", linewidth=0.6, linestyle=(0, (4, 3)), zorder=0.5)
     for group in np.split(speeds, np.flatnonzero(np.diff(speeds) > near) + 1) if speeds.size else []:
-        from_first, from_last = np.abs(ends - group[-1]).min(axis=0)
-        is_left = bool(from_first > from_last)  # where the curves are far
+        from_left, from_right = (
+            np.nanmin(abs(speed - group[-1]), initial=np.inf) for speed in (at_left, at_right)
+        )
+        is_left = bool(from_left > from_right)  # where the curves are far
         ax.annotate(
             f"critical, {', '.join(f'{value:.0f}' for value in group)} rpm",
             (0.0 if is_left else 1.0, group[-1]),

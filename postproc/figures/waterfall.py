@@ -46,7 +46,7 @@ def waterfall(
     form
         Spectra above one another, or colours.
     window
-        Revolutions in a spectrum.
+        Revolutions in a spectrum; at most half of the run-up.
     count
         How many spectra a waterfall has.
     max_order
@@ -68,6 +68,7 @@ def draw_waterfall(
     rpm = RPM * data["speed"].values
     span = float(np.ptp(rpm)) or 1.0
     top = float(amplitude.max()) or 1.0
+    max_order = min(max_order, float(data["order"].values[-1]))
     end = max_order if orders else max_order * float(rpm.max()) / 60.0
     for i in np.argsort(-rpm, kind="stable"):
         x = data["order"].values if orders else data["frequency"].values[i]
@@ -82,6 +83,7 @@ def draw_waterfall(
     scale = scale_of(data["amplitude"])
     _bar(ax, _HEIGHT * span, scale.label(f"{top * scale.factor:.3g}").replace("(", "").replace(")", ""))
     ax.set(xlabel=_abscissa(orders), ylabel="Spin speed (rpm)")
+    ax.ticklabel_format(axis="y", style="plain", useOffset=False)
     ax.set_title(f"{short_name(data['amplitude'].rename(signal))}, 0\N{EN DASH}peak", fontsize=8, pad=12)
     return ax
 
@@ -96,6 +98,7 @@ def draw_spectrogram(
     rpm = RPM * data["speed"].values[rising]
     scale = scale_of(data["amplitude"])
     amplitude = data["amplitude"].values[rising] * scale.factor
+    max_order = min(max_order, float(data["order"].values[-1]))
     end = max_order if orders else max_order * float(rpm.max()) / 60.0
     order = data["order"].values
     half = 0.5 * (order[1] - order[0])
@@ -128,6 +131,7 @@ def draw_spectrogram(
     name = f"{short_name(data['amplitude'].rename(signal))}, 0\N{EN DASH}peak"
     ax.figure.colorbar(mesh, ax=ax, label=scale.label(name), pad=0.06)
     ax.set(xlabel="Spin speed (rpm)", ylabel=_abscissa(orders))
+    ax.ticklabel_format(axis="x", style="plain", useOffset=False)
     return ax
 
 

@@ -28,6 +28,8 @@ MEANS = 6  # revolutions, whole periods of 1/2X and 1/3X
 def run_up_spectra(store: xr.Dataset, signal: str, window: int, count: int) -> xr.Dataset:
     """Return amplitude spectra of a run-up at `count` places, each over `window` revolutions, loaded.
 
+    A window is at most half of the run-up.
+
     Windows are Hann's: a line of a steady amplitude has its height, zero to peak.
 
     Returns
@@ -42,7 +44,7 @@ def run_up_spectra(store: xr.Dataset, signal: str, window: int, count: int) -> x
         It is no run-up of one case, or has no such signal.
     """
     data, per_revolution, n = _case(store, [signal])
-    window = min(window, n)
+    window = min(window, max(n // 2, 1))
     signal_rows = data[signal].values.astype(float)[: n * per_revolution]
     speed = data["speed"].values[:n]
     shape = 0.5 - 0.5 * np.cos(
@@ -102,7 +104,7 @@ def mean_positions(store: xr.Dataset, signals: Sequence[str]) -> xr.Dataset:
 def _case(store: xr.Dataset, signals: Sequence[str]) -> tuple[xr.Dataset, int, int]:
     """Signals and speed of one run-up, the samples in a revolution, and how many revolutions it has."""
     for signal in signals:
-        check_signal(signal)
+        check_signal(signal, store)
     if not is_run_up(store):
         raise InputError(f"{source(store)}: its speeds are constant; give a store of a study with [run_up]")
     data = (narrow(store, [*signals, "speed"]) if "status" in store else store[[*signals, "speed"]]).load()
