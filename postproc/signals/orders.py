@@ -62,7 +62,7 @@ def order_over_speed(
         There is no axis of speeds, no such signal, or the record does not hold whole periods of the order.
     """
     for signal in signals:
-        check_signal(signal)
+        check_signal(signal, store)
     found = (
         _of_run_up(store, signals, order, over)
         if is_run_up(store)

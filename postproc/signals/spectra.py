@@ -16,7 +16,7 @@ from postproc.store.axes import find_axis, source
 from postproc.store.select import narrow
 from rubhpc import spectra
 from rubhpc.errors import InputError
-from rubhpc.schema import SIGNAL_NAMES, is_signal
+from rubhpc.schema import PROBE, SIGNAL_NAMES, is_signal
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -164,9 +164,11 @@ def signal_or_whirl(signal: str, full: bool) -> str:
     return WHIRL if full else signal
 
 
-def check_signal(signal: str) -> None:
-    """Refuse a name that is not a recorded signal."""
+def check_signal(signal: str, store: xr.Dataset | None = None) -> None:
+    """Refuse a name that is not a recorded signal; a probe of `store` may have been meant."""
     if not is_signal(signal):
+        if store is not None and PROBE + signal in store:
+            raise InputError(f"{signal}: no such signal; did you mean {PROBE}{signal}?")
         velocity = " (a velocity has a section alone)" if signal.endswith("_velocity") else ""
         raise InputError(
             f"{signal}: no such signal{velocity}; there are {', '.join(SIGNAL_NAMES)}, and probe_NAME"

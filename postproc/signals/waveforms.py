@@ -51,7 +51,7 @@ def waveform_data(
         the end of each.
     """
     for signal in signals:
-        check_signal(signal)
+        check_signal(signal, store)
     names = [*dict.fromkeys(signals), *(() if is_run_up(store) else ("spin_speed",))]
     data = narrow(store, names, [find_axis(store, over)] if over else [])
     data = _last_of_each(store, data, revolutions, over)

@@ -32,6 +32,7 @@ _SHORT = {
     "speed_ratio": "Speed ratio $r$",
     "speed": "Spin speed",
     "spin_speed": "Spin speed",
+    "last_speed": "Last spin speed",
     "clearance_ratio": "Clearance ratio $c_g$",
     "clearance": "Clearance",
     "friction": "Friction coefficient",
@@ -90,7 +91,7 @@ _SYMBOLS = {
 }
 
 
-_SPEEDS = ("speed", "spin_speed", "drive_start")
+_SPEEDS = ("speed", "spin_speed", "last_speed", "drive_start")
 _CAPTION_WIDTH = 56  # characters that a column takes
 _MARKUP = re.compile(r"[$\\_]")  # of symbols, which takes no room
 

@@ -236,6 +236,8 @@ def test_what_has_no_run_up_is_refused():
         waterfall(steady)
     with pytest.raises(InputError, match="no such signal"):
         waterfall(run_up(), "vertcal")
+    with pytest.raises(InputError, match=r"left: no such signal; did you mean probe_left\?"):
+        waterfall(run_up(), "left")
 
 
 def test_the_speed_is_drawn_over_the_time_with_the_torques_of_a_drive():
