@@ -292,6 +292,8 @@ def role_of(name: str) -> str:
         return VARIABLES[name].role
     if name.startswith(POINT):
         return BRANCH
+    if name in (measure.name for measure in drive_measures()):
+        return "measure"
     if name.startswith(("revolution_", AMPLITUDE, PHASE)):
         return RUN_UP
     return next((role for prefix, (role, *_) in _OF_PROBES.items() if name.startswith(prefix)), "")

@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from postproc.store.axes import axes_of, drawn_axes, find_axis, source
+from postproc.store.run_ups import STEADY, is_run_up
 from postproc.store.select import narrow
 from postproc.store.units import meanings
 from postproc.store.variables import require_variables
@@ -49,7 +50,8 @@ def default_axes(
     free.sort(key=lambda a: -store.sizes[a])  # stable: of two equal ones the first in the grid
     if len(named) + len(free) < 2:
         sizes = ", ".join(f"{a} ({store.sizes[a]})" for a in axes) or "none"
-        advice = "over one axis, draw rubhpc bifurcation or open rubhpc report"
+        other = "open rubhpc report" if is_run_up(store) else "draw rubhpc bifurcation or open rubhpc report"
+        advice = f"over one axis, {other}"
         raise InputError(
             f"{source(store)}: a map needs two axes of several values; there is {sizes}; {advice}"
         )
@@ -121,7 +123,13 @@ def map_data(store: xr.Dataset, value: str, spread: Sequence[str], facets: Seque
     """
     if not is_mappable(value):
         require_variables(store, [value])
-        raise InputError(f"{source(store)}: {value}: not a measure of a case; choose {', '.join(MAPPABLE)}")
+        lacking = STEADY if is_run_up(store) else ()
+        known = ", ".join(n for n in map(str, store.data_vars) if is_mappable(n) and n not in lacking)
+        raise InputError(f"{source(store)}: {value}: not a measure of a case; choose {known}")
+    if is_run_up(store):
+        if value in STEADY:
+            raise InputError(f"{source(store)}: {value}: is of a steady speed; choose another measure")
+        store = store.drop_vars(STEADY, errors="ignore")
     store = store.assign(validity=validity(store))
     marks = ["status", "validity", *(n for n in ("settled",) if n in store)]  # older stores lack the last
     data = narrow(store, dict.fromkeys([value, *marks]), spread=[*spread, *facets])

@@ -15,6 +15,7 @@ from postproc.signals.sections import section_of, sections_along
 from postproc.store.axes import axes_of, find_axis, ordered_axes, source
 from postproc.store.branch_points import is_of_points, one_case
 from postproc.store.open import open_store
+from postproc.store.run_ups import is_run_up
 from postproc.store.select import first_of_rest, select
 from postproc.store.units import displayed, meanings, scale_of, short_name
 from postproc.store.variables import require_results, require_variables
@@ -71,6 +72,9 @@ def bifurcation(
     """
     if is_of_points(cases):
         return _of_branches(cases, signal, over)
+    if is_run_up(cases):
+        fix = "draw the section of one case, or the orders by rubhpc bode"
+        raise InputError(f"{source(cases)}: bifurcation: the speed changes, and no motion is steady; {fix}")
     if over is not None:
         raise InputError(f"{source(cases)}: over: is for branches; give the store of a study with [branch]")
     coloring = default_coloring(cases, color)

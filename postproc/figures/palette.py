@@ -8,7 +8,18 @@ import numpy as np
 
 from postproc.store.units import scale_of, short_name
 from rubhpc.errors import InputError
-from rubhpc.schema import DIVERGED, FAILED, HAS_VALUES, MISSING, REGIME, SCHEMES, SETTLED, STATUS, role_of
+from rubhpc.schema import (
+    DIVERGED,
+    FAILED,
+    HAS_VALUES,
+    MISSING,
+    RECORD_END,
+    REGIME,
+    SCHEMES,
+    SETTLED,
+    STATUS,
+    role_of,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -42,12 +53,13 @@ MOTION_COLORS = (
     "#882255",
 )
 WARNING = "#D55E00"  # seen on the dark and on the light end of the colour bar
-CATEGORIES = ("status", "regime", "period", "settled", "scheme")
+CATEGORIES = ("status", "regime", "period", "settled", "scheme", "record_end")
 _FLAGS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "status": (STATUS, STATUS_COLORS),
     "regime": (tuple(name.replace("quasi_", "quasi-").replace("_", " ") for name in REGIME), REGIME_COLORS),
     "settled": (tuple(name.replace("_", " ") for name in SETTLED), SETTLED_COLORS),
     "scheme": (tuple(name.replace("_", " ") for name in SCHEMES), SCHEME_COLORS),
+    "record_end": (tuple(name.replace("_", " ") for name in RECORD_END), SCHEME_COLORS),
 }
 
 

@@ -31,7 +31,10 @@ def color_bar(axes: Sequence[Axes], mesh: Any, paint: Paint) -> Colorbar:
     """Draw the colour scale next to all panels."""
     bar = axes[0].figure.colorbar(mesh, ax=list(axes), pad=0.02, aspect=25, ticks=paint.ticks)
     name, comma, rest = paint.label.rpartition(", ")
-    bar.set_label(f"{name},\n{rest}" if comma and len(paint.label) > _BAR_WIDTH else paint.label)
+    if len(paint.label) <= _BAR_WIDTH:
+        bar.set_label(paint.label)
+    else:
+        bar.set_label(f"{name},\n{rest}" if comma else textwrap.fill(paint.label, _BAR_WIDTH))
     if paint.names:
         bar.ax.set_yticklabels(color_names(paint.names))
         bar.ax.tick_params(which="both", length=0)

@@ -41,7 +41,7 @@ _FIRST = (
     "peak_to_peak_vertical",
     "peak_to_peak_horizontal",
 )
-_FLAGS = ("status", "regime", "period", "validity", "settled")
+_FLAGS = ("status", "regime", "period", "validity", "settled", "record_end")
 _WITHIN, *_BEYOND = ("#009E73", "#E69F00", "#56B4E9", "#CC79A7", "#F0E442", "#0072B2", "#D55E00", "#8C5A2B")
 _MOTION = ("peak_to_peak_vertical", "peak_to_peak_horizontal")
 # Measures of which all that is named has its unit.
@@ -91,7 +91,7 @@ class Measures:
 
         Its unit suits nine cases in ten; both directions of the disc, and the stators, have the same.
         """
-        if name == "spin_speed":
+        if name in ("spin_speed", "last_speed"):
             return Scale(30 / np.pi, "rpm")
         unit = VARIABLES[name].unit if name in SIGNAL_NAMES else self._unit(_measured(name))
         described = next((group for group, names in _SHARED if name in names), (_measured(name),))
@@ -143,7 +143,7 @@ class Measures:
         return name in self._drawn or (name in VARIABLES and VARIABLES[name].role == "setting")
 
     def _is_fill(self, name: str, values: NDArray[np.float64]) -> NDArray[np.bool_]:
-        is_integer = name in VARIABLES and VARIABLES[name].dtype.startswith("int")
+        is_integer = self._data[name].dtype.kind == "i"
         return (values == -1) if is_integer else np.zeros(values.shape, dtype=bool)
 
     def _categories(self, name: str) -> list[dict[str, Any]]:

@@ -14,6 +14,16 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _CONTACT = ("peak_contact_force", "contact_force")  # by which the most loaded stator is chosen
+STEADY = (  # measures of a motion at one speed, which run-ups lack
+    "regime",
+    "period",
+    "settled",
+    "transient_revolutions",
+    "whirl_ratio",
+    "lyapunov_exponent",
+    "largest_multiplier",
+    "multiplier_angle",
+)
 _NAMES = {"revolution_speed": "speed", "revolution_time": "time"}
 
 
@@ -51,7 +61,8 @@ def steady_view(store: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
 
 
 def measures_alone(store: xr.Dataset) -> xr.Dataset:
-    """Return a store of run-ups without its signals and revolutions."""
+    """Return a store of run-ups without its signals, revolutions and the measures that they lack."""
     kept = store.drop_dims(["sample", "revolution", "order"], errors="ignore")
+    kept = kept.drop_vars(STEADY, errors="ignore")
     kept.encoding.update(store.encoding)
     return kept

@@ -9,8 +9,11 @@ import running
 from running import check_a_lost_chunk
 
 import rubhpc
+from postproc.figures.bifurcation import bifurcation
 from postproc.figures.bode import bode
+from postproc.figures.map import map as map_figure
 from postproc.figures.speed import speed
+from postproc.report.page import Page
 from rubhpc.errors import InputError
 from rubhpc.running.recompute import reproduce
 from rubhpc.storage.store import Store
@@ -116,6 +119,18 @@ def test_figures_of_run_ups_show_driven_rotors(folder):
     store = rubhpc.open(folder / "driven.zarr")
     amplitude, _ = bode(store.isel(drive_torque=1), over="clearance").show()
     assert len([line for line in amplitude.lines if "$g$" in line.get_label()]) == 2
+
+
+def test_maps_show_measures_of_the_drive_and_none_of_a_steady_speed(folder):
+    store = rubhpc.open(folder / "driven.zarr")
+    speeds = map_figure(store, "last_speed")
+    assert (speeds.shown["last_speed"].sel(drive_torque=1.0) > 188.0).all()
+    assert "last_speed" in Page(store).measures.names
+    assert map_figure(store, "record_end").show().collections
+    for draw in (map_figure, lambda cases, _: bifurcation(cases)):
+        with pytest.raises(InputError, match="steady"):
+            draw(store, "regime")
+    assert "regime" not in Page(store).measures.names
 
 
 @pytest.mark.parametrize(
