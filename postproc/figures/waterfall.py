@@ -14,12 +14,16 @@ from postproc.store.units import scale_of, short_name
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
+    from numpy.typing import NDArray
 
     from postproc.figures.options import Count, Positive
+
+    Floats = NDArray[np.float64]
 
 _HEIGHT = 0.3  # of the ordinate, that the highest line takes
 _DECADES = 3.0
 _ROWS = 200  # of a spectrogram
+_BACK = 0.1  # of the way of the speed, up to which it may go back where spectra are drawn over it
 _LINES = (0.5, 1.0, 2.0, 3.0)  # orders that are drawn
 
 
@@ -35,7 +39,8 @@ def waterfall(
 ) -> Drawing:
     """Waterfall, or spectrogram, of a run-up: spectra over the speed.
 
-    Each spectrum is of a few revolutions, seen through Hann's window.
+    Each spectrum is of a few revolutions, seen through Hann's window. Where the speed rises and falls, they
+    are drawn over the revolutions.
 
     Parameters
     ----------
@@ -66,23 +71,23 @@ def draw_waterfall(
     """Draw spectra above one another, each at its speed."""
     amplitude = data["amplitude"].values
     rpm = RPM * data["speed"].values
-    span = float(np.ptp(rpm)) or 1.0
+    at, label = _places(data, rpm)
+    span = float(np.ptp(at)) or 1.0
     top = float(amplitude.max()) or 1.0
     max_order = min(max_order, float(data["order"].values[-1]))
     end = max_order if orders else max_order * float(rpm.max()) / 60.0
-    for i in np.argsort(-rpm, kind="stable"):
+    for i in np.argsort(-at, kind="stable"):
         x = data["order"].values if orders else data["frequency"].values[i]
         inside = x <= end
-        height = rpm[i] + _HEIGHT * span * amplitude[i, inside] / top
-        ax.fill_between(
-            x[inside], rpm[i], height, color="white", linewidth=0.0, zorder=1.0 - 1e-3 * rpm[i] / rpm.max()
-        )
-        ax.plot(x[inside], height, color="C0", linewidth=0.6, zorder=1.0 - 1e-3 * rpm[i] / rpm.max())
-    ax.set(xlim=(0.0, end), ylim=(rpm.min(), rpm.max() + 1.05 * _HEIGHT * span))
-    _draw_orders(ax, orders, end)
+        height = at[i] + _HEIGHT * span * amplitude[i, inside] / top
+        depth = 1.0 - 1e-3 * at[i] / at.max()
+        ax.fill_between(x[inside], at[i], height, color="white", linewidth=0.0, zorder=depth)
+        ax.plot(x[inside], height, color="C0", linewidth=0.6, zorder=depth)
+    ax.set(xlim=(0.0, end), ylim=(at.min(), at.max() + 1.05 * _HEIGHT * span))
+    _draw_orders(ax, orders, end, None if at is rpm else (rpm, at))
     scale = scale_of(data["amplitude"])
     _bar(ax, _HEIGHT * span, scale.label(f"{top * scale.factor:.3g}").replace("(", "").replace(")", ""))
-    ax.set(xlabel=_abscissa(orders), ylabel="Spin speed (rpm)")
+    ax.set(xlabel=_abscissa(orders), ylabel=label)
     ax.ticklabel_format(axis="y", style="plain", useOffset=False)
     ax.set_title(f"{short_name(data['amplitude'].rename(signal))}, 0\N{EN DASH}peak", fontsize=8, pad=12)
     return ax
@@ -94,8 +99,9 @@ def draw_spectrogram(
     """Draw amplitudes as colours over speed and frequency."""
     from matplotlib.colors import LogNorm
 
-    rising = np.argsort(data["speed"].values, kind="stable")
-    rpm = RPM * data["speed"].values[rising]
+    at, label = _places(data, RPM * data["speed"].values)
+    rising = np.argsort(at, kind="stable")
+    at, rpm = at[rising], RPM * data["speed"].values[rising]
     scale = scale_of(data["amplitude"])
     amplitude = data["amplitude"].values[rising] * scale.factor
     max_order = min(max_order, float(data["order"].values[-1]))
@@ -108,8 +114,8 @@ def draw_spectrogram(
         heights = heights * rpm[:, np.newaxis] / 60.0
     top = float(amplitude.max()) or 1.0
     # A column for every spectrum, between the midpoints of the speeds.
-    middle = 0.5 * (rpm[1:] + rpm[:-1]) if rpm.size > 1 else np.zeros(0)
-    bounds = np.concatenate([rpm[:1], middle, rpm[-1:]])
+    middle = 0.5 * (at[1:] + at[:-1]) if at.size > 1 else np.zeros(0)
+    bounds = np.concatenate([at[:1], middle, at[-1:]])
     mesh: Any = None
     for i in range(rpm.size):
         mesh = ax.pcolormesh(
@@ -120,28 +126,44 @@ def draw_spectrogram(
             cmap="viridis",
             rasterized=True,
         )
-    ax.set(xlim=(rpm.min(), rpm.max()), ylim=(0.0, end))
+    ax.set(xlim=(at.min(), at.max()), ylim=(0.0, end))
     for line in _LINES:
         if line < max_order:
-            ends = np.array([line, line]) if orders else line * rpm[[0, -1]] / 60.0
-            ax.plot(rpm[[0, -1]], ends, color="white", linewidth=0.4, linestyle=(0, (4, 4)))
-            if ends[-1] < end:
+            height = np.full(rpm.size, line) if orders else line * rpm / 60.0
+            ax.plot(at, height, color="white", linewidth=0.4, linestyle=(0, (4, 4)))
+            if height[-1] < end:
                 style: dict[str, Any] = {"xytext": (2, 0), "ha": "left", "va": "center", "fontsize": 6}
-                ax.annotate(_named(line), (rpm[-1], ends[-1]), textcoords="offset points", **style)
+                ax.annotate(_named(line), (at[-1], height[-1]), textcoords="offset points", **style)
     name = f"{short_name(data['amplitude'].rename(signal))}, 0\N{EN DASH}peak"
     ax.figure.colorbar(mesh, ax=ax, label=scale.label(name), pad=0.06)
-    ax.set(xlabel="Spin speed (rpm)", ylabel=_abscissa(orders))
+    ax.set(xlabel=label, ylabel=_abscissa(orders))
     ax.ticklabel_format(axis="x", style="plain", useOffset=False)
     return ax
 
 
-def _draw_orders(ax: Axes, orders: bool, end: float) -> None:
-    """Lines of the orders, named at their upper ends."""
+def _places(data: xr.Dataset, rpm: Floats) -> tuple[Floats, str]:
+    """Where spectra are drawn: at their speeds, `rpm` itself, or where these rise and fall at revolutions."""
+    steps = np.diff(rpm)
+    rise, fall = steps[steps > 0.0].sum(), -steps[steps < 0.0].sum()
+    if min(rise, fall) <= _BACK * max(rise, fall):
+        return rpm, "Spin speed (rpm)"
+    return data["revolution"].values, f"Revolution, {rpm.min():.0f} to {rpm.max():.0f} rpm"
+
+
+def _draw_orders(ax: Axes, orders: bool, end: float, turns: tuple[Floats, Floats] | None = None) -> None:
+    """Lines of the orders, named at their upper ends; `turns`: speeds (rpm) and places, if not the speeds."""
     low, high = ax.get_ylim()
     style: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": 6}
     for line in _LINES:
         ends = np.array([line, line]) if orders else line * np.array([low, high]) / 60.0
-        if ends[1] <= end:
+        if turns is not None and not orders:
+            x = line * turns[0] / 60.0
+            ax.plot(x, turns[1], color="0.5", linewidth=0.5, linestyle=(0, (4, 4)), zorder=0.5)
+            near = int(np.argmax(turns[1]))
+            place = (x[near], turns[1][near])
+            if place[0] <= end:
+                ax.annotate(_named(line), place, xytext=(0, 1), textcoords="offset points", **style)
+        elif ends[1] <= end:
             ax.plot(ends, [low, high], color="0.5", linewidth=0.5, linestyle=(0, (4, 4)), zorder=0.5)
             place = (ends[1], high)
             ax.annotate(_named(line), place, xytext=(0, 1), textcoords="offset points", **style)

@@ -22,13 +22,14 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
+FEWEST = 8  # revolutions in which a spectrum separates 1X and 1/2X
 MEANS = 6  # revolutions, whole periods of 1/2X and 1/3X
 
 
 def run_up_spectra(store: xr.Dataset, signal: str, window: int, count: int) -> xr.Dataset:
     """Return amplitude spectra of a run-up at `count` places, each over `window` revolutions, loaded.
 
-    A window is at most half of the run-up.
+    A window is at most half of the run-up, but for one of less than twice `FEWEST` revolutions.
 
     Windows are Hann's: a line of a steady amplitude has its height, zero to peak.
 
@@ -36,15 +37,18 @@ def run_up_spectra(store: xr.Dataset, signal: str, window: int, count: int) -> x
     -------
     Dataset
         `amplitude` over (place, order) in the unit of the signal, `frequency` (Hz) likewise, and over `place`
-        the mean `speed`, rad/s.
+        the mean `speed`, rad/s, and the `revolution` in the middle.
 
     Raises
     ------
     InputError
-        It is no run-up of one case, or has no such signal.
+        It is no run-up of one case, has no more than `FEWEST` revolutions or no such signal.
     """
     data, per_revolution, n = _case(store, [signal])
-    window = min(window, max(n // 2, 1))
+    if n <= FEWEST:
+        problem = f"this run-up has {n} revolutions, too few for spectra over its speed"
+        raise InputError(f"{source(store)}: {problem}; draw it with rubhpc waveform")
+    window = min(window, max(n // 2, FEWEST))
     signal_rows = data[signal].values.astype(float)[: n * per_revolution]
     speed = data["speed"].values[:n]
     shape = 0.5 - 0.5 * np.cos(
@@ -64,6 +68,7 @@ def run_up_spectra(store: xr.Dataset, signal: str, window: int, count: int) -> x
         | {
             "order": ("order", order, {"units": "1", "long_name": "order of the spin frequency"}),
             "speed": ("place", np.array(speeds), {"units": "rad s-1", "long_name": "spin speed"}),
+            "revolution": ("place", starts + 0.5 * window, {"units": "1", "long_name": "revolution"}),
             "frequency": (
                 ("place", "order"),
                 np.outer(speeds, order) / (2.0 * math.pi),

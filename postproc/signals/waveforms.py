@@ -136,6 +136,8 @@ def seen_by_two(
     store: xr.Dataset, probes: tuple[str, str], spread: Sequence[str] = (), others: Sequence[str] = ()
 ) -> xr.Dataset:
     """Return vertical and horizontal motion from two displacements along other directions, and `others`."""
+    if isinstance(probes, str) or len(probes) != 2:
+        raise InputError(f"{source(store)}: probes: {probes}: give the names of two probes at one place")
     first, second = (probe_of(store, name) for name in probes)
     for probe in (first, second):
         if probe["quantity"] not in ("displacement", "velocity", "acceleration"):

@@ -81,6 +81,18 @@ def test_a_waterfall_stacks_them_at_their_speeds():
     assert colours.get_ylim() == (0.0, 4.0)
 
 
+def test_a_waterfall_of_a_speed_that_rises_and_falls_is_drawn_over_revolutions():
+    passed = run_up()
+    passed["speed"][:] = np.concatenate([np.linspace(50.0, 150.0, TURNS // 2), np.linspace(150.0, 50.0, 30)])
+    ax = waterfall(passed, window=8, count=10).show()
+    assert ax.get_ylabel().startswith("Revolution, ")
+    assert ax.get_ylim()[0] == 4.0
+    assert waterfall(passed, form="spectrogram", window=8).show().get_xlim() == (4.0, 56.0)
+    few = passed.isel(revolution=slice(0, 6), sample=slice(0, 6 * N))
+    with pytest.raises(InputError, match="this run-up has 6 revolutions, too few for spectra"):
+        waterfall(few)
+
+
 def test_a_polar_plot_turns_the_lag_against_the_rotation_from_the_probe():
     ax = polar(run_up(), "probe_left").show()
     curve = ax.get_lines()[np.argmax([line.get_xdata().size == TURNS for line in ax.get_lines()])]
