@@ -24,6 +24,10 @@ STEADY = (  # measures of a motion at one speed, which run-ups lack
     "largest_multiplier",
     "multiplier_angle",
 )
+_HIGHEST = (
+    "spin_speed",
+    "contact_free_amplitude",
+)  # of a run-up at its highest speed, of a drive at its first
 _NAMES = {"revolution_speed": "speed", "revolution_time": "time"}
 
 
@@ -63,6 +67,6 @@ def steady_view(store: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
 def measures_alone(store: xr.Dataset) -> xr.Dataset:
     """Return a store of run-ups without its signals, revolutions and the measures that they lack."""
     kept = store.drop_dims(["sample", "revolution", "order"], errors="ignore")
-    kept = kept.drop_vars(STEADY, errors="ignore")
+    kept = kept.drop_vars([*STEADY, *_HIGHEST], errors="ignore")
     kept.encoding.update(store.encoding)
     return kept
