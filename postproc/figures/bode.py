@@ -8,7 +8,7 @@ import numpy as np
 
 from postproc.figures.drawing import Drawing
 from postproc.figures.overlay import overlaid
-from postproc.figures.run_up_marks import RPM, critical_speeds, written_speeds
+from postproc.figures.run_up_marks import RPM, critical_speeds, falling, written_speeds
 from postproc.figures.ticks import degree_steps
 from postproc.signals.orders import order_over_speed, written_lag
 from postproc.store.run_ups import is_run_up
@@ -36,6 +36,7 @@ LEAST_LAG = 45.0  # degrees by which the lag grows between the half-power points
 # 0.9 at least, however small the damping, that of a beat 0.4 at most (half a turn of Fresnel's integral).
 LEAST_WIDTH = 0.6
 ROOM = 0.28  # of the width of a plot, between two peaks that are named
+_FAINT = 0.45  # of a curve where the speed falls, if it rises elsewhere
 _DASHES = ("-", (0, (4, 1.5)), (0, (1, 1)), (0, (4, 1, 1, 1)))  # of signals, where colours are those of cases
 
 
@@ -103,6 +104,7 @@ def draw_bode(
     n_case = data.sizes[over] if over else 1
     if n_case > 1 and len(signals) > len(_DASHES):
         raise InputError(f"{len(signals)} signals of several cases cannot be distinguished; select one case")
+    is_swept, has_fallen = along == "revolution", False
     peaks: list[tuple[ResponsePeak, Line2D]] = []
     for i_signal, name in enumerate(signals):
         amplitude, phase = data[f"amplitude_{name}"], data[f"phase_{name}"]
@@ -115,32 +117,40 @@ def draw_bode(
             label = ", ".join(text for text in (own, case) if text) or None
             if n_case > 1:
                 style |= {"color": f"C{i_case}", "linestyle": _DASHES[i_signal]}
-            (curve,) = top.plot(rpm, height.values * scale.factor, label=label, **style)
-            lag = written_lag(lead.values, rpm, before)
+            size, lag = height.values * scale.factor, written_lag(lead.values, rpm, before)
             before = rpm, lag
-            if order == 1.0:
-                is_swept = along == "revolution"
-                found = peaks_of(own_speeds.values, height.values * scale.factor, lag, is_swept)
+            back = falling(rpm) if is_swept else np.zeros(rpm.size, dtype=bool)
+            (curve,) = top.plot(rpm, np.where(back, np.nan, size), label=label, **style)
+            bottom.plot(rpm, np.where(back, np.nan, lag), **style)
+            if back.any():
+                faint: dict[str, Any] = style | {"color": curve.get_color(), "alpha": _FAINT}
+                top.plot(rpm, np.where(back, size, np.nan), **faint)
+                bottom.plot(rpm, np.where(back, lag, np.nan), **faint)
+                has_fallen = True
+            for way in (~back, back) if order == 1.0 else ():
+                found = peaks_of(own_speeds.values[way], size[way], lag[way], is_swept)
                 peaks += [(peak, curve) for peak in found]
-            bottom.plot(rpm, lag, **style)
     shown = [signal_name(data[f"amplitude_{signals[0]}"])] if len(signals) == 1 else []
     top.set_title(", ".join([*shown, written_order(order)]), fontsize=8)
     top.set(ylabel=scale.label("Amplitude, 0\N{EN DASH}peak"), xlim=ends)
     top.set_ylim(bottom=0.0)
     _name_peaks(top, peaks)
+    is_lost = not any(np.isfinite(line.get_ydata()).any() for line in bottom.lines)
+    if has_fallen:
+        top.plot([], [], color="k", alpha=_FAINT, linewidth=0.8, label="speed falls")
     for i, speed in enumerate(critical):
         line: dict[str, Any] = {"color": "0.6", "linewidth": 0.6, "linestyle": (0, (4, 3)), "zorder": 0.5}
         top.axvline(speed * RPM, label=None if i else written_speeds(critical), **line)
         bottom.axvline(speed * RPM, **line)
-    if len(signals) * n_case > 1 or critical:
+    if len(signals) * n_case > 1 or critical or has_fallen:
         place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.2), "ncols": 2}
         bottom.legend(*top.get_legend_handles_labels(), fontsize=6, frameon=False, **place)
     bottom.set(xlabel="Spin speed (rpm)", ylabel="Phase lag (\N{DEGREE SIGN})")
-    if any(np.isfinite(line.get_ydata()).any() for line in bottom.lines[: len(signals) * n_case]):
+    if is_lost:
+        _name_lost_phase(bottom, written_order(order))
+    else:
         bottom.invert_yaxis()
         bottom.yaxis.set_major_locator(degree_steps(bottom))
-    else:
-        _name_lost_phase(bottom, written_order(order))
     bottom.ticklabel_format(axis="x", style="plain", useOffset=False)
     top.figure.align_ylabels(axes)
 
@@ -158,10 +168,10 @@ def peaks_of(speed: Floats, height: Floats, lag: Floats, is_swept: bool = False)
     The amplitude falls to 0.707 of a peak on both sides, and the lag grows by `LEAST_LAG` between these.
     Where the speed `is_swept`, one value a revolution, beats with what rings behind a resonance are left out.
     """
-    least = LEAST_WIDTH * np.sqrt(abs(np.gradient(speed)) * speed) if is_swept and speed.size > 1 else None
-    known = np.isfinite(speed) & np.isfinite(height)
-    speed, height, lag = speed[known], height[known], lag[known]
-    least = np.zeros_like(speed) if least is None else least[known]
+    rate = abs(np.gradient(speed)) if speed.size > 1 else np.zeros(speed.size)
+    least = LEAST_WIDTH * np.sqrt(rate * speed) if is_swept else np.zeros(speed.size)
+    known = np.isfinite(speed) & np.isfinite(height) & (rate > 1e-9 * speed)  # not where the speed is held
+    speed, height, lag, least = speed[known], height[known], lag[known], least[known]
     steps = np.diff(speed)
     if speed.size < 3 or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
         return []

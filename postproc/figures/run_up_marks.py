@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 RPM = 30.0 / math.pi
 APART = 0.085  # of the diagonal of a plot, between named speeds
+_BACK = 0.1  # of the way of a speed, up to which it may go back and counts as going one way
 _STEPS = 60  # of speed, on which modes are followed
 
 
@@ -55,6 +56,14 @@ def _excited_within(table: str, low: float, high: float) -> list[float]:
             return []
     found = find_critical_speeds(model, np.linspace(low, high, _STEPS))
     return [critical.speed for critical in found if critical.is_excited]
+
+
+def falling(speed: Floats) -> NDArray[np.bool_]:
+    """Whether a speed (n,) that rises and falls is falling; nowhere, if it goes one way but for a tenth."""
+    steps = np.nan_to_num(np.gradient(speed)) if speed.size > 1 else np.zeros(speed.size)
+    rise, fall = steps[steps > 0.0].sum(), -steps[steps < 0.0].sum()
+    is_one_way = min(rise, fall) <= _BACK * max(rise, fall)
+    return np.zeros(speed.size, dtype=bool) if is_one_way else steps < 0.0
 
 
 def written_speeds(speeds: Iterable[float]) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from postproc.figures.drawing import Drawing
-from postproc.figures.run_up_marks import RPM
+from postproc.figures.run_up_marks import RPM, falling
 from postproc.signals.run_up_spectra import run_up_spectra
 from postproc.store.units import scale_of, short_name
 
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 _HEIGHT = 0.3  # of the ordinate, that the highest line takes
 _DECADES = 3.0
 _ROWS = 200  # of a spectrogram
-_BACK = 0.1  # of the way of the speed, up to which it may go back where spectra are drawn over it
 _LINES = (0.5, 1.0, 2.0, 3.0)  # orders that are drawn
 
 
@@ -143,9 +142,7 @@ def draw_spectrogram(
 
 def _places(data: xr.Dataset, rpm: Floats) -> tuple[Floats, str]:
     """Where spectra are drawn: at their speeds, `rpm` itself, or where these rise and fall at revolutions."""
-    steps = np.diff(rpm)
-    rise, fall = steps[steps > 0.0].sum(), -steps[steps < 0.0].sum()
-    if min(rise, fall) <= _BACK * max(rise, fall):
+    if not falling(rpm).any():
         return rpm, "Spin speed (rpm)"
     return data["revolution"].values, f"Revolution, {rpm.min():.0f} to {rpm.max():.0f} rpm"
 

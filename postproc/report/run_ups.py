@@ -56,7 +56,8 @@ def run_up_facts(store: xr.Dataset) -> dict[str, Any]:
         )
     left = f"; the first {MOST_DRAWN} of {len(done)} cases are drawn" if len(done) > MOST_DRAWN else ""
     named = signal.removeprefix(PROBE).replace("_", " ")
-    return {"text": f"Bode plot and waterfall of {named}{left}.", "cases": cases}
+    named = f"the probe {named}" if signal.startswith(PROBE) else f"the {named} motion"
+    return {"text": f"Speed, and Bode plot and waterfall of {named}{left}.", "cases": cases}
 
 
 def _signal(store: xr.Dataset) -> str:

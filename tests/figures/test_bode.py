@@ -155,6 +155,24 @@ def test_beats_behind_a_resonance_are_no_peaks():
     assert 1.0 < peak.speed / natural < 1.08
 
 
+def test_both_ways_of_a_speed_are_drawn_and_named():
+    """Up through a resonance, held for ten revolutions, and down."""
+    up = np.linspace(50.0, 150.0, 401)
+    speed = np.r_[up, np.full(10, 150.0), up[::-1]]
+    response = 1e-6 / (1.0 - (speed / 100.0) ** 2 + 0.1j * speed / 100.0)
+    lines = {"amplitude_vertical": abs(response), "phase_vertical": np.unwrap(np.angle(response))}
+    data = xr.Dataset(
+        {name: (("revolution", "order"), values[:, None]) for name, values in lines.items()}
+        | {"speed": ("revolution", speed)},
+        coords={"order": [1.0], "revolution": np.arange(speed.size)},
+    )
+    top, _ = bode(data).show()
+    rising, back = (np.flatnonzero(np.isfinite(line.get_ydata())) for line in top.lines[:2])
+    assert rising[-1] <= back[0] == pytest.approx(411, abs=1)
+    (named,) = top.texts  # where there is room
+    assert named.get_text() == "953 rpm, AF 9.95"
+
+
 def test_signals_of_different_units_share_no_ordinate():
     data = study().isel(friction=0)
     data = data.assign(torsion=data["vertical"].assign_attrs(units="rad"))

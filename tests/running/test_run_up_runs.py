@@ -174,7 +174,7 @@ def test_a_report_shows_measures_and_pictures(folder, monkeypatch, tmp_path):
     assert "start 1800 rpm, stop 1500 rpm" in page
     assert page.count('alt="Speed, ') == page.count('alt="Bode plot, ') == 1
     assert 'alt="Waterfall' not in page  # of 13 revolutions at most
-    assert "Bode plot and waterfall of left; the first 1 of 4 cases are drawn." in page
+    assert "Speed, and Bode plot and waterfall of the probe left; the first 1 of 4 cases are drawn." in page
 
 
 @pytest.mark.parametrize(
