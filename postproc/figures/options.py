@@ -28,7 +28,9 @@ __all__ = [
     "Seed",
     "Sequence",
     "Share",
+    "Speed",
     "hertz",
+    "spin_speed",
 ]
 
 
@@ -61,6 +63,7 @@ class Metavar:
 Axis = Annotated[str, Metavar("AXIS")]
 File = Annotated[str, Metavar("FILE")]
 Hertz = Annotated[float | str, Metavar("HZ")]  # a number, or text with a unit
+Speed = Annotated[float | str, Metavar("SPEED")]  # a number (rad/s), or text with a unit
 Count = Annotated[int, Bounds(least=1)]
 Seed = Annotated[int, Bounds(least=0)]
 Positive = Annotated[float, Bounds(least=0.0, is_open=True)]
@@ -75,11 +78,20 @@ def hertz(value: float | str, option: str) -> float:
     InputError
         The text is not a frequency, or not above 0; `option` names it.
     """
+    return _above_zero(value, "Hz", option)
+
+
+def spin_speed(value: float | str, option: str) -> float:
+    """Return a spin speed above 0, rad/s, likewise."""
+    return _above_zero(value, "rad/s", option)
+
+
+def _above_zero(value: float | str, unit: str, option: str) -> float:
     from rubhpc.input.quantity import parse_quantity
 
     with suppress(ValueError):  # text with a unit
         value = float(value)
-    frequency = parse_quantity(value, "Hz", option)
-    if frequency <= 0:
-        raise InputError(f"{option}: {frequency:g} Hz is out of range; give one above 0")
-    return frequency
+    size = parse_quantity(value, unit, option)
+    if size <= 0:
+        raise InputError(f"{option}: {size:g} {unit} is out of range; give one above 0")
+    return size

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from postproc.figures.drawing import Drawing
+from postproc.figures.options import spin_speed
 from postproc.figures.overlay import overlaid
 from postproc.figures.run_up_marks import title_speeds
 from postproc.figures.small_multiples import legend_below
@@ -23,13 +24,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from postproc.figures.options import Axis, Count
+    from postproc.figures.options import Axis, Count, Speed
 
 
 def orbit(
     cases: xr.Dataset,
     *,
     revolutions: Count | None = None,
+    at: Speed | None = None,
     over: Axis | None = None,
     probes: tuple[str, str] | None = None,
 ) -> Drawing:
@@ -43,13 +45,16 @@ def orbit(
     cases
         One case, or cases along the axis `over`.
     revolutions
-        Only the last ones [default: all].
+        Only the last ones [default: all], or how many around the speed `at` [default: 4].
+    at
+        Spin speed of a run-up, such as "2000 rpm", around which its orbit is drawn.
     over
         Draw the cases along AXIS over one another.
     probes
         Names of two probes at one place, whose motion is drawn in place of the disc's.
     """
-    shown = orbit_data(cases, revolutions, over, probes)
+    speed = None if at is None else spin_speed(at, "--at")
+    shown = orbit_data(cases, revolutions, over, probes, speed)
 
     def draw(axes: list[Axes]) -> None:
         draw_orbit(shown, axes[0])

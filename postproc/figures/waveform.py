@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from postproc.figures.drawing import Drawing
+from postproc.figures.options import spin_speed
 from postproc.figures.overlay import overlaid
 from postproc.figures.run_up_marks import title_speeds
 from postproc.figures.small_multiples import legend_below
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-    from postproc.figures.options import Axis, Count
+    from postproc.figures.options import Axis, Count, Speed
 
 _LABEL_WIDTH = 18  # characters that fit next to a low panel
 _UNIT = re.compile(r"\(.*\)$")
@@ -34,6 +35,7 @@ def waveform(
     signal: str | Sequence[str] = (),
     *,
     revolutions: Count = 4,
+    at: Speed | None = None,
     over: Axis | None = None,
 ) -> Drawing:
     """Waveforms of some signals over the last revolutions.
@@ -47,13 +49,16 @@ def waveform(
     signal
         May be repeated [default: motion and contact force].
     revolutions
-        The last ones.
+        The last ones, or those around the speed `at`.
+    at
+        Spin speed of a run-up, such as "2000 rpm".
     over
         Draw the cases along AXIS over one another.
     """
     named = (signal,) if isinstance(signal, str) else signal
     signals = tuple(dict.fromkeys(named)) or DEFAULT_SIGNALS
-    shown = waveform_data(cases, signals, revolutions, over)
+    speed = None if at is None else spin_speed(at, "--at")
+    shown = waveform_data(cases, signals, revolutions, over, speed)
     return Drawing(shown=shown, draw=lambda axes: draw_panels(shown, axes), panels=(len(signals), 1))
 
 
@@ -64,7 +69,7 @@ def draw_waveform(signal: xr.DataArray, ax: Axes) -> Axes:
     scale = scale_of(signal)
     x, x_label = displayed(_abscissa(signal))
     if x[0] < 0.0:
-        x_label = "Revolution, from the end"
+        x_label = str(signal["revolution"].attrs["long_name"]).capitalize()
     for name, curve in overlaid(signal, "sample"):
         ax.plot(x, curve.values * scale.factor, label=name)
     ax.set(xlim=(x[0], x[-1]), xlabel=x_label, ylabel=scale.label(short_name(signal)))

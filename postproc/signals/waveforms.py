@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _LEAST_SINE = 0.05  # of the angle between two probes: 3 degrees
+_RPM = 30.0 / math.pi
+_AT_A_SPEED = 4  # revolutions around a speed of a run-up, by default
 _ONE_SPEED = 2e-3  # by which the speeds of several cases may differ where one is named
 DEFAULT_SIGNALS = ("vertical", "horizontal", "torsion", "contact_force")
 
@@ -33,8 +35,9 @@ def waveform_data(
     signals: Sequence[str] = DEFAULT_SIGNALS,
     revolutions: int | None = 4,
     over: str | None = None,
+    at: float | None = None,
 ) -> xr.Dataset:
-    """Return the last revolutions of some signals; lazy.
+    """Return the last revolutions of some signals, or those of a run-up around a speed; lazy.
 
     Parameters
     ----------
@@ -42,19 +45,26 @@ def waveform_data(
         One case (and one stator, for a stator's signals), or cases along the axis `over`.
     revolutions : int, optional
         How many; None for all that were recorded.
+    at : float, rad/s, optional
+        Spin speed of a run-up.
 
     Returns
     -------
     Dataset
         The signals over `sample`, with the coordinate `revolution` and, where all cases turn at one speed,
-        `time` (s) from the first sample kept. Of run-ups that differ in length, `revolution` counts from
-        the end of each.
+        `time` (s) from the first sample kept. Of run-ups that reach their end or the speed in different
+        revolutions, `revolution` counts from that of each.
+
+    Raises
+    ------
+    InputError
+        The speed is none of the run-up's, or of a study at constant speeds.
     """
     for signal in signals:
         check_signal(signal, store)
     names = [*dict.fromkeys(signals), *(() if is_run_up(store) else ("spin_speed",))]
     data = narrow(store, names, [find_axis(store, over)] if over else [])
-    data = _last_of_each(store, data, revolutions, over)
+    data = _kept(store, data, revolutions, over, at)
     spin = np.unique(data["spin_speed"].values) if "spin_speed" in data else np.zeros(0)
     if spin.size == 1 and spin[0] > 0:
         time = (data["revolution"] - data["revolution"][0]) * (2 * math.pi / float(spin[0]))
@@ -67,6 +77,7 @@ def orbit_data(
     revolutions: int | None = None,
     over: str | None = None,
     probes: tuple[str, str] | None = None,
+    at: float | None = None,
 ) -> xr.Dataset:
     """Return the last revolutions of vertical and horizontal motion, with the clearance; lazy.
 
@@ -82,52 +93,84 @@ def orbit_data(
     probes : (name, name), optional
         Two probes at one place whose signals, which need not be at right angles, give the motion there in
         place of that of the disc; the clearance is left out.
+    at : float, rad/s, optional
+        Spin speed of a run-up, around which revolutions are kept in place of the last ones.
+
+    Raises
+    ------
+    InputError
+        As of `waveform_data`, and for probes that do not give a motion.
     """
     spread = [find_axis(store, over)] if over else []
     if probes is None:
         data = narrow(store, ["vertical", "horizontal", "clearance"], spread)
     else:
         data = seen_by_two(store, probes, spread)
-    data = _last_of_each(store, data, revolutions, over)
+    data = _kept(store, data, revolutions, over, at)
     if probes is None and not spread and is_carried(data) and all(name in store for name in NEEDED):
-        tips = _last_of_each(store, narrow(store, NEEDED, ["stator"]), revolutions, None)
+        tips = _kept(store, narrow(store, NEEDED, ["stator"]), revolutions, None, at)
         moved = zip(("carrier_vertical", "carrier_horizontal"), mean_shift(tips).T, strict=True)
         data = data.assign({name: ("stator", values, {"units": "m"}) for name, values in moved})
     return data
 
 
-def _last_of_each(
-    store: xr.Dataset, data: xr.Dataset, revolutions: int | None, over: str | None
+def _kept(
+    store: xr.Dataset, data: xr.Dataset, revolutions: int | None, over: str | None, at: float | None
 ) -> xr.Dataset:
-    """Return the last revolutions of each case; of run-ups, which differ in length, before its own end."""
+    """Return the last revolutions of each case; of run-ups before their own end, or around a speed."""
     n = samples_per_revolution(data["revolution"])
     if not is_run_up(store):
+        if at is not None:
+            raise InputError(f"{source(store)}: at: its speeds are constant; select one of them")
         return data if revolutions is None else data.isel(sample=slice(-revolutions * n, None))
     spread = [find_axis(store, over)] if over else []
     speed = (narrow(store, ["speed"], spread) if "status" in store else store)["speed"]
     turned = speed.notnull().sum("revolution").values
-    ends, longest = np.unique(turned[turned > 0]), data.sizes["sample"] // n
-    if ends.size and (kept := _speeds(speed, turned, revolutions or longest)):
-        data.attrs["spin_speeds"] = kept
-    if not ends.size or (revolutions is None and ends.size > 1):
+    if not turned.any() or (revolutions is None and at is None and np.unique(turned[turned > 0]).size > 1):
         return data
-    count = min(revolutions or longest, int(ends[0]))
-    if ends.size == 1:
-        return data.isel(sample=slice((int(ends[0]) - count) * n, int(ends[0]) * n))
+    wanted = (revolutions or _AT_A_SPEED) if at is not None else (revolutions or data.sizes["sample"] // n)
+    count = min(wanted, int(turned[turned > 0].min()))
+    ends = turned if at is None else _ends_around(store, speed, turned, count, at)
+    if shown := _speeds(speed, ends, count):
+        data.attrs["spin_speeds"] = shown
+    same = np.unique(ends[turned > 0])
+    if same.size == 1:
+        return data.isel(sample=slice((int(same[0]) - count) * n, int(same[0]) * n))
     before = {"sample": slice(0, count * n)}
-    shifts = xr.DataArray(count - turned, dims=spread)
+    shifts = xr.DataArray(count - ends, dims=spread)
     rows = [
         data.isel({spread[0]: i}).drop_vars("revolution").shift(sample=int(shift) * n).isel(before)
         for i, shift in enumerate(shifts.values)
     ]
-    place = np.arange(count * n) / n - count
-    about = {"units": "1", "long_name": "revolution, from the end"}
+    place = np.arange(count * n) / n - (count if at is None else count // 2)
+    where = "the end" if at is None else "that at the speed"
+    about = {"units": "1", "long_name": f"revolution, from {where}"}
     return xr.concat(rows, spread[0]).assign_coords(revolution=("sample", place, about))
 
 
-def _speeds(speed: xr.DataArray, turned: NDArray[np.int64], revolutions: int) -> list[float]:
-    """Mean speed of the first and last of the last revolutions, rad/s; [] where that of cases differs."""
-    rows, ends = np.atleast_2d(speed.values), np.atleast_1d(turned)
+def _ends_around(
+    store: xr.Dataset, speed: xr.DataArray, turned: NDArray[np.int64], count: int, at: float
+) -> NDArray[np.int64]:
+    """Ends of `count` revolutions around a speed, rad/s, that each case first has; 0 of one without any."""
+    ends = np.zeros_like(turned)
+    for place in np.ndindex(turned.shape):
+        end = int(turned[place])
+        own = speed.values[place][:end]
+        if not own.size:
+            continue
+        step, low, high = (float(v) for v in (np.abs(np.diff(own)).max(initial=0.0), own.min(), own.max()))
+        if not low - step <= at <= high + step:
+            given, least, most = (f"{_RPM * value:.6g}" for value in (at, low, high))
+            problem = f"{given} rpm is none of its speeds, {least} to {most} rpm"
+            raise InputError(f"{source(store)}: at: {problem}; give one of these")
+        first = int(np.argmin(np.abs(own - at))) - count // 2
+        ends[place] = np.clip(first, 0, end - count) + count
+    return ends
+
+
+def _speeds(speed: xr.DataArray, until: NDArray[np.int64], revolutions: int) -> list[float]:
+    """Mean speed of the first and last revolution before each end, rad/s; [] where that of cases differs."""
+    rows, ends = np.atleast_2d(speed.values), np.atleast_1d(until)
     kept = [row[[max(end - revolutions, 0), end - 1]] for row, end in zip(rows, ends, strict=True) if end]
     return kept[0].tolist() if np.allclose(kept, kept[0], rtol=_ONE_SPEED) else []
 

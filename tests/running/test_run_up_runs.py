@@ -140,6 +140,24 @@ def test_waveforms_end_with_their_own_case(folder):
     assert orbit(store.isel(run_up_time=0), revolutions=2).show().get_title(loc="left").endswith("rpm")
 
 
+def test_waveforms_and_orbits_around_a_speed(folder):
+    """Run-ups of different rates have a speed in different revolutions."""
+    store = rubhpc.open(folder / "run_ups.zarr").isel(clearance=1)
+    speeds, at = store["speed"].squeeze().values, 1680.0 / 9.5493
+    own = [int(np.nanargmin(abs(row - at))) for row in speeds]
+    assert own[0] != own[1]
+    both = waveform_data(store, ["vertical"], 2, over="run_up_time", at=at)
+    assert both["revolution"].values[[0, -1]] == pytest.approx([-1.0, 1 - 1 / 32])
+    for i, turn in enumerate(own):
+        whole = store["vertical"].isel(run_up_time=i).values.ravel()
+        assert (both["vertical"][i].values == whole[(turn - 1) * 32 : (turn + 1) * 32]).all()
+    ax = orbit(store.isel(run_up_time=0), at="1680 rpm").show()
+    first, last = (int(word) for word in ax.get_title(loc="left").removesuffix(" rpm").split(" to "))
+    assert first >= 1680 >= last  # a coast-down
+    with pytest.raises(InputError, match="5000 rpm is none of its speeds, 15"):
+        orbit(store.isel(run_up_time=0), at="5000 rpm")
+
+
 @pytest.mark.parametrize("kind", ["csv", "parquet"])
 def test_revolutions_are_exported_as_rows(folder, tmp_path, kind):
     store, path = rubhpc.open(folder / "run_ups.zarr"), tmp_path / f"table.{kind}"
