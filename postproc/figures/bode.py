@@ -35,7 +35,8 @@ LEAST_LAG = 45.0  # degrees by which the lag grows between the half-power points
 # Width of a peak at half power, of the root of the acceleration (Hz, from Hz/s): that of a resonance is some
 # 0.9 at least, however small the damping, that of a beat 0.4 at most (half a turn of Fresnel's integral).
 LEAST_WIDTH = 0.6
-ROOM = 0.28  # of the width of a plot, between two peaks that are named
+ROOM = 0.28  # of the width of a plot, between two peaks that are named in the same row
+ROWS, LESSER = 3, 0.3  # of names above one another; height of a peak over that of one so near, at least
 _FAINT = 0.45  # of a curve where the speed falls, if it rises elsewhere
 _DASHES = ("-", (0, (4, 1.5)), (0, (1, 1)), (0, (4, 1, 1, 1)))  # of signals, where colours are those of cases
 
@@ -189,23 +190,28 @@ def peaks_of(speed: Floats, height: Floats, lag: Floats, is_swept: bool = False)
 def _name_peaks(ax: Axes, peaks: Sequence[tuple[ResponsePeak, Line2D]]) -> None:
     """Write speed (rpm) and amplification factor at peaks, from the highest, where there is room.
 
-    The words are above all curves, in the colour of their own.
+    The words are above all curves, in the colour of their own; those of near peaks are above one another.
     """
-    taken: list[float] = []
+    taken: list[tuple[float, float, int]] = []  # speed, height and row of each
     room, curves = ROOM * np.ptp(ax.get_xlim()), [np.asarray(line.get_data()) for line in ax.lines]
     for peak, line in sorted(peaks, key=lambda named: -named[0].amplitude):
         rpm = RPM * peak.speed
-        if any(abs(rpm - other) < room for other in taken):
+        near = [(height, row) for other, height, row in taken if abs(rpm - other) < room]
+        row = 1 + max((row for _, row in near), default=-1)
+        if row == ROWS or any(peak.amplitude < LESSER * height for height, _ in near):
             continue
-        taken.append(rpm)
         words = f"{rpm:.0f} rpm, AF {peak.amplification_factor:.3g}"
+        if any(words == text.get_text() for text in ax.texts):  # on the way down as on the way up
+            continue
         top = max(float(np.nanmax(y[abs(x - rpm) < 0.6 * room], initial=peak.amplitude)) for x, y in curves)
+        top = max([top, *(height for height, _ in near)])
+        taken.append((rpm, top, row))
         share = (rpm - ax.get_xlim()[0]) / np.ptp(ax.get_xlim())
         side = "left" if share < 0.5 * ROOM else "right" if share > 1.0 - 0.5 * ROOM else "center"
-        place: dict[str, Any] = {"xytext": (0, 2), "textcoords": "offset points", "ha": side}
+        place: dict[str, Any] = {"xytext": (0, 2 + 8 * row), "textcoords": "offset points", "ha": side}
         behind = {"facecolor": "white", "edgecolor": "none", "pad": 0.5}
         ax.annotate(words, (rpm, top), va="bottom", fontsize=6, color=line.get_color(), bbox=behind, **place)
-        ax.set_ylim(top=max(ax.get_ylim()[1], 1.2 * top))
+        ax.set_ylim(top=max(ax.get_ylim()[1], (1.2 + 0.1 * row) * top))
 
 
 def signal_name(amplitude: xr.DataArray) -> str:

@@ -46,6 +46,8 @@ SAFE = 0.9  # share of the widest accurate range
 LEAST, MOST = 0.5, 0.85  # factors by which a range shrinks
 STEEPEST = 5.0  # assumed power of the error in the range
 CLOSE = 1.2  # ratio of an inaccurate and an accurate range at which the search ends
+NEARLY = 1.1  # factor by which an accurate range may be widened by its error, below which the search ends
+GREATEST = 2.0  # factor by which it is widened
 
 
 class Reach(NamedTuple):
@@ -74,6 +76,7 @@ def followed_reach(
     *,
     accuracy: float,
     others: tuple[float, float],
+    guess: float | None = None,
 ) -> Reach:
     """The widest range that begins at a speed (rad/s), in the direction of the acceleration.
 
@@ -88,13 +91,16 @@ def followed_reach(
         Relative error of each signal at the ends of the range of accelerations; half of it by the speed.
     others : (float, float), rad/s^2
         Least and greatest acceleration that may occur.
+    guess : float, optional, rad/s
+        Half of the range tried first; by default the widest.
     """
     sense = float(np.sign(acceleration))
     part = _part(rotor, speed, speed + (sense or 1.0) * widest)
     if not part.size:
         return Reach(widest, _swing(rotor, speed, momentum, accuracy))
     of_part = _of_part(rotor, part)
-    half, nodes = _widest_within(of_part, speed, sense, widest, abs(acceleration), AT_ENDS * accuracy)
+    tried = widest, abs(acceleration), AT_ENDS * accuracy, guess
+    half, nodes = _widest_within(of_part, speed, sense, *tried)
     middle = speed + sense * half
     turning = momentum[np.ix_(part, part)]
     swing = _swing(of_part, middle, turning, accuracy)
@@ -111,30 +117,41 @@ def followed_reach(
 
 
 def _widest_within(
-    rotor: Rotor, speed: float, sense: float, widest: float, acceleration: float, allowed: float
+    rotor: Rotor,
+    speed: float,
+    sense: float,
+    widest: float,
+    acceleration: float,
+    allowed: float,
+    guess: float | None,
 ) -> tuple[float, list[tuple[Complexes, Complexes]] | None]:
     """Half of the widest accurate range, at most `widest` (rad/s), and its modes.
 
-    The range is narrowed until it is accurate, then bisected with the last inaccurate one.
+    The first range tried (`guess`, or the widest) is narrowed or widened by its error, until one is nearly as
+    wide as possible: by its error, or compared with one that was too wide.
     """
-    half, too_wide, least = widest, math.inf, NARROWEST * speed
+    half, too_wide, least = min(widest, guess or widest), math.inf, NARROWEST * speed
     best: tuple[float, list[tuple[Complexes, Complexes]]] | None = None
     while True:
         middle = speed + sense * half
         nodes = _nodes(rotor, middle, half)
-        error = _error(rotor, nodes, middle, half, acceleration) if nodes else np.inf
+        enough = allowed if best else allowed * (SAFE / LEAST) ** STEEPEST  # more says nothing more
+        error = _error(rotor, nodes, middle, half, acceleration, enough) if nodes else np.inf
+        by_error = SAFE * (allowed / error) ** (1.0 / STEEPEST) if error > 0.0 else np.inf
         if nodes and error <= allowed:
             best = half, nodes
+            if half >= widest or by_error <= NEARLY:
+                return best
+            half = min(widest, half * min(by_error, GREATEST))
         elif half <= least:
             return half, nodes
         else:
             too_wide = half
-        if best is None:
-            half *= float(np.clip(SAFE * (allowed / error) ** (1.0 / STEEPEST), LEAST, MOST))
-        elif CLOSE * best[0] < too_wide < np.inf:
+            half *= float(np.clip(by_error, LEAST, MOST))
+        if best and too_wide < np.inf:
+            if too_wide <= CLOSE * best[0]:
+                return best
             half = math.sqrt(best[0] * too_wide)
-        else:
-            return best
 
 
 def _part(rotor: Rotor, speed: float, other: float) -> Ints:
@@ -179,16 +196,19 @@ def _error(
     middle: float,
     half: float,
     acceleration: float,
+    enough: float,
 ) -> float:
-    """Relative error of the worst signal in a range."""
+    """Relative error of the worst signal in a range, or one above `enough`."""
     exponents, shapes = [node[0] for node in nodes], [node[1] for node in nodes]
-    worst = leak(shapes, middle) * AT_ENDS / LEAK
+    worst = 0.0
     for place in (*PLACES, *resonances(nodes, middle, half)):
         speed = middle + place * half
         growth = min(PASSING * speed, acceleration / half)
         modes = between(exponents, place), between(shapes, place)
         worst = max(worst, signal_error(rotor, rotor.matrices(speed), modes, speed, growth))
-    return worst
+        if worst > enough:
+            return worst
+    return max(worst, leak(shapes, middle) * AT_ENDS / LEAK)
 
 
 def _swing(rotor: Rotor, speed: float, momentum: Floats, accuracy: float) -> float:

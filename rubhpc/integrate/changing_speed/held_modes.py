@@ -97,17 +97,20 @@ class HeldModes(ModeLibrary):
         self._exponents = {}
         self._held: dict[int, tuple[ModeTables, HeldMode]] = {}  # by the set of closed pairs
         self._strange: set[int] = set()  # modes that cannot be followed
+        self._counted: tuple[tuple[int, ...], int] = (), 0  # modes, and their memory, bytes
 
     @property
     def n_byte(self) -> int:
         """Memory that its contact modes hold."""
-        fields = (field for kept in self._held.values() for part in kept for field in part)
-        sizes = {
-            id(field): field.nbytes
-            for field in fields
-            if isinstance(field, np.ndarray) and any(field.strides)
-        }
-        return sum(sizes.values())
+        if self._counted[0] != (masks := tuple(self._held)):
+            fields = (field for kept in self._held.values() for part in kept for field in part)
+            sizes = {
+                id(field): field.nbytes
+                for field in fields
+                if isinstance(field, np.ndarray) and any(field.strides)
+            }
+            self._counted = masks, sum(sizes.values())
+        return self._counted[1]
 
     def follows(self, mask: int) -> bool:
         """Whether a mode follows the speed, in coordinates that go on from piece to piece."""

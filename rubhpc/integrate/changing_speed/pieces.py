@@ -31,8 +31,8 @@ MOST_HELD = 4  # matrices at hand, of a spin that swings between them
 MOST_BYTES = 3 * 2**29  # of contact modes that are kept, with their matrices, for other cases
 MOST_DRIVEN_BYTES = 2**27  # the same of a free spin, whose cases have few speeds in common
 
-# Of each set-up, the matrices by speed, acceleration, slope of the torque and the accelerations to come, the
-# latest last, for other cases too.
+# Of each set-up, the matrices by speed, acceleration, slope of the torque, the accelerations to come and the
+# range before, the latest last, for other cases too.
 _KNOWN: WeakKeyDictionary[ModalSetup, dict[tuple[object, ...], HeldMatrices]] = WeakKeyDictionary()
 
 _RIPPLES: WeakKeyDictionary[ModalSetup, Ripples] = WeakKeyDictionary()
@@ -135,8 +135,9 @@ class Pieces:
                     self._held.insert(0, self._held.pop(i))
                 return held
         known = _KNOWN.setdefault(self._fastest, {})
-        asked = speed, acceleration, slope, self._ranges.accelerations
-        found = known.pop(asked, None) or self._ranges.hold(speed, acceleration, slope)
+        guess = self._held[0].reach if self._held else None
+        asked = speed, acceleration, slope, self._ranges.accelerations, guess
+        found = known.pop(asked, None) or self._ranges.hold(speed, acceleration, slope, guess)
         if self._make_room(known):
             known[asked] = found
             self._used.add(asked)

@@ -67,16 +67,19 @@ class SpeedRanges:
         phasor = (model.unbalance_cosine - 1j * model.unbalance_sine) @ self._basis[:n]
         self.phasor = phasor.astype(np.complex128)
 
-    def hold(self, speed: float, acceleration: float, slope: float) -> HeldMatrices:
+    def hold(
+        self, speed: float, acceleration: float, slope: float, guess: float | None = None
+    ) -> HeldMatrices:
         """Matrices for a speed at the near end of the range over which they may be held.
 
-        That of a free spin, which may turn back, is in the middle of the range.
+        That of a free spin, which may turn back, is in the middle of the range. `guess` (rad/s) is half of
+        the range tried first.
         """
         fastest, free = self._fastest, self._fastest.free_spin
         is_followed = free is None
         judge: Judge | None = None
         if is_followed:
-            reach, swing, judge = self._followed_reach(speed, acceleration)
+            reach, swing, judge = self._followed_reach(speed, acceleration, guess)
         else:
             reach, swing = self._held_reach(speed, acceleration, slope)
         if free is None:
@@ -169,7 +172,7 @@ class SpeedRanges:
             reduced.__dict__[name] = getattr(fastest.reduced, name)
         return model, reduced
 
-    def _followed_reach(self, speed: float, acceleration: float) -> Reach:
+    def _followed_reach(self, speed: float, acceleration: float, guess: float | None) -> Reach:
         """The range in which modes follow the speed."""
 
         def matrices(at: float) -> tuple[Floats, Floats]:
@@ -189,6 +192,7 @@ class SpeedRanges:
             widest,
             accuracy=self._fastest.accuracy,
             others=self.accelerations or (acceleration, acceleration),
+            guess=guess,
         )
 
     def _widest(self, speed: float, acceleration: float) -> float:
