@@ -116,9 +116,9 @@ class HeldModes(ModeLibrary):
         """Whether a mode follows the speed, in coordinates that go on from piece to piece."""
         return bool(self._beside) and mask not in self._strange
 
-    def has_strange(self) -> bool:
-        """Whether one of the modes cannot be followed, and is solved at each piece."""
-        return bool(self._strange)
+    def has_strange(self, met: set[int]) -> bool:
+        """Whether one of the modes met cannot be followed, and is solved at each piece."""
+        return not self._strange.isdisjoint(met)
 
     def _has(self, mask: int) -> bool:
         """Whether it has the mode with these pairs closed; one met for the first time is solved."""

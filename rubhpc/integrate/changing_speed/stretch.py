@@ -54,7 +54,7 @@ def begin_stretch(
         return None
     if left is not None and library.follows(march.mask):
         march.keep_fast(left, setup.spin, since)
-    return None if library.n_room == 1 or library.has_strange() else library
+    return None if library.n_room == 1 or library.has_strange(march.met) else library
 
 
 def take_stretch(
@@ -122,7 +122,7 @@ def take_stretch(
         if outcome == MODE_WANTED:
             library.reach(int(pieces.at[PIECE]))
             march.find_wanted()
-            if library.has_strange():  # from here on piece by piece
+            if library.has_strange(march.met):  # from here on piece by piece
                 march.step_back(pieces)
                 break
             pieces = pieces._replace(table=library.tuned(march.met))

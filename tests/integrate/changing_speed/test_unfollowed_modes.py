@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from overhung_pump import SEGMENT, pump
+from test_steep_run_ups import machine
 
 from rubhpc import LumpedStator
 from rubhpc.integrate.changing_speed import held_modes
@@ -57,3 +58,21 @@ def test_modes_that_are_solved_at_each_piece(monkeypatch, contact, refused):
     for name in ("vertical", "horizontal", "torsion"):
         size = np.sqrt(np.mean(followed[name] ** 2))
         assert np.sqrt(np.mean((solved[name] - followed[name]) ** 2)) < 1e-4 * size, name
+
+
+def test_a_case_without_contact_does_not_depend_on_one_with_contact():
+    """In the same matrices, whose contact modes some pieces cannot follow: not by its last digits."""
+    law = SpeedLaw(time=(0.0, 0.3), speed=(350.0, 420.0))
+    recording = Recording(transient=0, revolutions=law.n_revolution, samples_per_revolution=SAMPLES)
+
+    def run_both(clearances):
+        setup = prepare(
+            machine(1), 420.0, contact=Contact(), integrator=Integrator(), samples_per_revolution=SAMPLES
+        )
+        case = {"recording": recording, "friction": 0.1, "initial": CASE["initial"]}
+        return [record_run_up(setup, law, clearance=c, **case).arrays for c in clearances]
+
+    (alone,), (rub, after) = run_both([5e-3]), run_both([1.6e-4, 5e-3])
+    assert rub["contact_force"].max() > 0.0
+    for name, values in alone.items():
+        assert np.array_equal(after[name], values, equal_nan=True), name
