@@ -67,9 +67,10 @@ def draw_waveform(signal: xr.DataArray, ax: Axes) -> Axes:
     signal = signal.load()
     require_results(signal, signal.to_dataset())
     scale = scale_of(signal)
-    x, x_label = displayed(_abscissa(signal))
-    if x[0] < 0.0:
-        x_label = str(signal["revolution"].attrs["long_name"]).capitalize()
+    abscissa = _abscissa(signal)
+    x, x_label = displayed(abscissa)
+    if abscissa.name == "revolution" and x[0] < 0.0:
+        x_label = str(abscissa.attrs["long_name"]).capitalize()
     for name, curve in overlaid(signal, "sample"):
         ax.plot(x, curve.values * scale.factor, label=name)
     ax.set(xlim=(x[0], x[-1]), xlabel=x_label, ylabel=scale.label(short_name(signal)))
