@@ -46,7 +46,7 @@ test: $(VENV)/.ready ## all tests but those of `make faults` and `make bench`
 	$(BIN)/python -m pytest $(PARALLEL) -m "$(ORDINARY) and not serial"
 	$(BIN)/python -m pytest --durations=15 $(ALONE) -m "$(ORDINARY) and serial"
 
-kernels: $(VENV)/.installed ## compile the kernels, two to four minutes, unless that is done
+kernels: $(VENV)/.installed ## compile the kernels, two to three minutes, unless that is done
 	$(BIN)/python tests/support/kernel_cache.py
 
 # What `make test` leaves out is in one of these two.

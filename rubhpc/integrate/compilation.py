@@ -14,23 +14,16 @@ from rubhpc.kernels._jit import compilation
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-_STICK, _CURVED, _RUN_UP_STICK = (
-    "for friction with stick",
-    "for curved gaps",
-    "for run-ups under friction with stick",
-)
-_LONG = {_STICK, _CURVED, _RUN_UP_STICK}  # parts that take more than a minute
+_LONG = _STICK, _CURVED = "for friction with stick", "for curved gaps"  # parts that take more than a minute
 # Kernels with their own announcement -> purpose; they are compiled when a case first needs them.
 _PARTS = {
-    "advance_friction_sections": _STICK,
-    "advance_with_friction": _STICK,
+    "advance_by_course": _STICK,
     "advance_by_steps": "for contact in short steps",
     "advance_curved": _CURVED,
     "follow_revolutions": "for periodic motions",
     "search_period": "for periodic motions",
     "fill_theory": "for periodic motions",
     "advance_pieces": "for run-ups",
-    "advance_friction_pieces": _RUN_UP_STICK,
     "carry_along": "for neighbouring motions, which distinguish chaos from order",
 }
 _announced: set[str] = set()
@@ -53,7 +46,7 @@ def announce_by(announce: Callable[[str], None]) -> None:
         part = _PARTS.get(name, "")
         if part not in _announced:
             _announced.add(part)
-            lasts = "two to four minutes" if part in _LONG else "up to a minute"
+            lasts = "one to three minutes" if part in _LONG else "up to a minute"
             announce(f"compiling kernels{part and ' '}{part}, once after an installation: {lasts}")
 
     compilation.began = begin

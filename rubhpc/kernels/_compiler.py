@@ -6,9 +6,10 @@ tuple that is deleted. Without these copies LLVM receives a tenth of the code.
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
-from numba.core import ir, types
+from numba.core import inline_closurecall, ir, types
 from numba.core.cgutils import gep_inbounds
 from numba.core.cgutils import ir as llvm  # type: ignore[attr-defined]  # a package of its own
 from numba.core.codegen import JITCodeLibrary
@@ -17,6 +18,7 @@ from numba.core.compiler import Flags as NumbaFlags
 from numba.core.compiler_machinery import register_pass
 from numba.core.lowering import Lower
 from numba.core.typed_passes import BaseNativeLowering, NativeLowering
+from numba.core.untyped_passes import InlineInlinables
 
 
 class Flags(NumbaFlags):
@@ -121,6 +123,27 @@ class _FieldLowering(BaseNativeLowering):
         return _FieldLower
 
 
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _Inlining(InlineInlinables):
+    """Numba's inlining without its copies of functions that are read anew for each call.
+
+    It copies them twice, and with each block all of the function's variables.
+    """
+
+    _name = "inlining_without_copies"
+
+    def run_pass(self, state: Any) -> bool:
+        inlining: Any = inline_closurecall
+        copies, inlining.copy = inlining.copy, SimpleNamespace(deepcopy=lambda block: block)
+        try:
+            return bool(super().run_pass(state))
+        finally:
+            inlining.copy = copies
+
+
+_OUR_PASSES = {NativeLowering: _FieldLowering, InlineInlinables: _Inlining}
+
+
 class _KernelCode(JITCodeLibrary):
     """Code of a kernel; without reference counting, the search for reference operations is skipped."""
 
@@ -185,9 +208,7 @@ class KernelCompiler(Compiler):
     def define_pipelines(self) -> Any:
         pipelines = super().define_pipelines()
         for pipeline in pipelines:
-            pipeline.passes = [
-                (_FieldLowering if step is NativeLowering else step, said) for step, said in pipeline.passes
-            ]
+            pipeline.passes = [(_OUR_PASSES.get(step, step), said) for step, said in pipeline.passes]
             pipeline.finalize()
         return pipelines
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import jit_inline_sum, jit_part_sum
 from rubhpc.kernels.case_progress import (
     FINISHED,
     MODE_WANTED,
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
-@jit_lean_sum
+@jit_part_sum
 def advance_with_friction(
     tables: ModeTables,
     reduced: Reduced,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum, jit_part_sum
 from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
     DIVERGED,
@@ -61,7 +61,7 @@ AT_REST = 1e-4  # of the rim speed: a pair that slips less than that at the begi
 LEAST_FORCE = float(np.finfo(float).tiny)  # N, of a closed pair
 
 
-@jit_lean_sum
+@jit_part_sum
 def advance_friction_pieces(
     tables: ModeTables,
     reduced: Reduced,
@@ -89,6 +89,7 @@ def advance_friction_pieces(
         FINISHED, or what `friction_loop.advance_with_friction` stopped with in the piece under way;
         CONTACT_UNSOLVED too where no states go on from its beginning.
     """
+    is_recorded = bool(np.bool_(True))  # no literal: the loop is compiled for one type
     at, n_part = pieces.at, pieces.n_sample // pieces.n_part_sample
     while at[PIECE] < pieces.spin.size:
         piece = at[PIECE]
@@ -123,7 +124,7 @@ def advance_friction_pieces(
                 bodies,
                 now,
                 last_tick,
-                True,
+                is_recorded,
                 progress,
                 z,
                 z_next,

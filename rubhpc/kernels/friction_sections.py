@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_lean_sum
+from rubhpc.kernels._jit import jit_part_sum
 from rubhpc.kernels.case_progress import FINISHED, Clock, Progress
 from rubhpc.kernels.friction_loop import advance_with_friction
 from rubhpc.kernels.sections_loop import note_section
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
-@jit_lean_sum
+@jit_part_sum
 def advance_friction_sections(
     tables: ModeTables,
     reduced: Reduced,
@@ -51,6 +51,7 @@ def advance_friction_sections(
         there.
     """
     per_revolution = clock.samples_per_revolution << clock.sample_level
+    is_recorded = bool(np.bool_(False))  # no literal: the loop is compiled for one type
     motion_re, motion_im, n_revolution = tables.motion_re, tables.motion_im, sections.shape[0]
     while progress.tick < 0:
         k = n_revolution + progress.tick // per_revolution
@@ -60,7 +61,7 @@ def advance_friction_sections(
             bodies,
             clock,
             (k + 1 - n_revolution) * per_revolution,
-            False,
+            is_recorded,
             progress,
             z,
             z_next,

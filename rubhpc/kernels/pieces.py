@@ -51,6 +51,30 @@ class Pieces(NamedTuple):
     whole: Floats  # (o, k n_sample), samples
 
 
+_NUMBERS, _COUNTS, _ROWS = np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros((0, 0))
+NO_PIECES = Pieces(
+    spin=_NUMBERS,
+    growth=_NUMBERS,
+    tick=_NUMBERS,
+    search_level=_COUNTS,
+    force=np.zeros((0, 2, 0)),
+    since=_NUMBERS,
+    table=_COUNTS,
+    n_room=0,
+    n_sample=0,
+    n_part_sample=0,
+    energy_limit=0.0,
+    at=_COUNTS,
+    moved_by=0,
+    left=_ROWS,
+    motion=_ROWS,
+    pressing=_ROWS,
+    seen=_ROWS,
+    n_step=_COUNTS,
+    whole=_ROWS,
+)
+
+
 @jit_inline_sum
 def clock_of(clock: Clock, pieces: Pieces, piece: int) -> Clock:
     """Clock of a piece, from that of any other."""

@@ -15,25 +15,21 @@ def test_each_part_is_announced_once(monkeypatch):
     with compilation.announced_by(texts.append):
         for name in ("enter_with", "advance", "carry_along", "enter_with", "carry_along", "advance_by_steps"):
             _jit.compilation.began(name)
-        for name in ("advance_friction_sections", "advance_with_friction", "advance_friction_pieces"):
-            _jit.compilation.began(name)
+        _jit.compilation.began("advance_by_course")
     assert _jit.compilation.began is before
-    common, longer = (f"once after an installation: {t}" for t in ("up to a minute", "two to four minutes"))
+    common, longer = (f"once after an installation: {t}" for t in ("up to a minute", "one to three minutes"))
     assert texts == [
         f"compiling kernels, {common}",
         f"compiling kernels for neighbouring motions, which distinguish chaos from order, {common}",
         f"compiling kernels for contact in short steps, {common}",
         f"compiling kernels for friction with stick, {longer}",
-        f"compiling kernels for run-ups under friction with stick, {longer}",
     ]
 
 
 def test_parts_are_names_of_kernels():
     from rubhpc.kernels import (
         curved_loop,
-        friction_loop,
-        friction_pieces,
-        friction_sections,
+        friction_course,
         linear_theory,
         piece_loop,
         revolutions,
@@ -43,8 +39,7 @@ def test_parts_are_names_of_kernels():
     )
 
     modules = (
-        revolutions, shooting, linear_theory, tangent, stepping_loop, curved_loop, friction_loop,
-        friction_sections, friction_pieces, piece_loop
+        revolutions, shooting, linear_theory, tangent, stepping_loop, curved_loop, friction_course, piece_loop
     )  # fmt: skip
     kernels = {name for module in modules for name in vars(module)}
     assert all(name in kernels for name in compilation._PARTS)

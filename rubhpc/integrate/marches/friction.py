@@ -11,6 +11,7 @@ from rubhpc.integrate.marches.march import NO_FORCES
 from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.marches.short_steps import ShortSteps
 from rubhpc.integrate.marches.state_sets import StateSets
+from rubhpc.integrate.measuring.samples import new_accumulator, stacked_accumulators
 from rubhpc.integrate.record import State
 from rubhpc.integrate.reduced_model.transitions import MetTransitions, TransitionRoom
 from rubhpc.kernels.case_progress import (
@@ -22,10 +23,9 @@ from rubhpc.kernels.case_progress import (
 )
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE, ModeTables
 from rubhpc.kernels.earlier_spans import earlier_spans, forget_earlier, no_earlier_spans
-from rubhpc.kernels.friction_loop import advance_with_friction
-from rubhpc.kernels.friction_pieces import advance_friction_pieces
-from rubhpc.kernels.friction_sections import advance_friction_sections
+from rubhpc.kernels.friction_course import advance_by_course
 from rubhpc.kernels.friction_spans import new_spans
+from rubhpc.kernels.pieces import NO_PIECES
 from rubhpc.kernels.trail import BROKEN
 from rubhpc.kernels.transitions import NO_TRANSITIONS
 
@@ -43,6 +43,10 @@ if TYPE_CHECKING:
     from rubhpc.kernels.transitions import Transitions
 
     Floats = NDArray[np.float64]
+
+_NO_SECTIONS = np.zeros((0, 0))
+_NO_RECORD = new_accumulator(0)
+_NO_SUMS = stacked_accumulators(0, _NO_RECORD)
 
 
 class FrictionMarch(StateSets):
@@ -164,24 +168,7 @@ class FrictionMarch(StateSets):
     def _advance_sections_in_closed_form(
         self, samples: Samples, accumulator: Accumulator, sections: Floats
     ) -> int:
-        return advance_friction_sections(
-            self.tables,
-            self.bodies,
-            self._friction,
-            self.clock,
-            self._setup.displacement_limit,
-            self._setup.energy_limit,
-            self._bare_progress,
-            self._z,
-            self._z_next,
-            self._motion,
-            self._work,
-            self._recorder,
-            samples,
-            accumulator,
-            sections,
-            self.transitions,
-        )
+        return self._on_course(samples, accumulator, self.transitions, sections=sections)
 
     def _kernel(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
         while True:
@@ -195,13 +182,38 @@ class FrictionMarch(StateSets):
             self._hand_over()
 
     def _advance(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
-        return advance_with_friction(
+        return self._on_course(samples, accumulator, self.transitions, (last_tick, is_recorded))
+
+    def _advance_pieces(self, pieces: Pieces, samples: Samples, sums: Accumulator) -> int:
+        work = self._work
+        self._work = work._replace(earlier=self._no_earlier)  # a mode is another one in the next piece
+        try:
+            return self._on_course(samples, _NO_RECORD, NO_TRANSITIONS, pieces=pieces, sums=sums)
+        finally:
+            self._work = work
+
+    def _on_course(
+        self,
+        samples: Samples,
+        accumulator: Accumulator,
+        transitions: Transitions,
+        to: tuple[int, bool] = (0, False),
+        sections: Floats = _NO_SECTIONS,
+        pieces: Pieces = NO_PIECES,
+        sums: Accumulator = _NO_SUMS,
+    ) -> int:
+        """Advance through pieces, by sections, or `to` a tick, recorded or not."""
+        return advance_by_course(
             self.tables,
             self.bodies,
             self._friction,
             self.clock,
-            last_tick,
-            is_recorded,
+            *to,
+            sections,
+            self._setup.displacement_limit,
+            self._setup.energy_limit,
+            pieces,
+            sums,
             self._bare_progress,
             self._z,
             self._z_next,
@@ -210,25 +222,7 @@ class FrictionMarch(StateSets):
             self._recorder,
             samples,
             accumulator,
-            self.transitions,
-        )
-
-    def _advance_pieces(self, pieces: Pieces, samples: Samples, sums: Accumulator) -> int:
-        return advance_friction_pieces(
-            self.tables,
-            self.bodies,
-            self._friction,
-            self.clock,
-            pieces,
-            self._bare_progress,
-            self._z,
-            self._z_next,
-            self._motion,
-            self._work._replace(earlier=self._no_earlier),  # a mode is another one in the next piece
-            self._recorder,
-            samples,
-            sums,
-            NO_TRANSITIONS,
+            transitions,
         )
 
     def _hand_over(self) -> None:
