@@ -16,6 +16,7 @@ import click
 from postproc.catalogue import figures
 from rubhpc import __version__
 from rubhpc.errors import RubError, printable
+from rubhpc.frames import with_room
 from rubhpc.running.launch import FIRST_SPEAKS, launch, leave
 from rubhpc.threads import VARIABLES
 
@@ -106,7 +107,7 @@ def main(args: list[str] | None = None) -> None:
     for name in VARIABLES:
         os.environ[name] = "1"
     try:
-        code = commands.main(args, prog_name="rubhpc", standalone_mode=False)
+        code = with_room(commands.main, args, prog_name="rubhpc", standalone_mode=False)
     except RubError as error:
         code = _report(str(error), error.exit_code)
     except click.ClickException as error:

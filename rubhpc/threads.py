@@ -8,6 +8,8 @@ from __future__ import annotations
 from functools import cache, wraps
 from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
+from rubhpc.frames import with_room
+
 if TYPE_CHECKING:
     from collections.abc import Callable
     from contextlib import AbstractContextManager
@@ -29,12 +31,15 @@ VARIABLES = (
 
 
 def on_one_thread(function: Callable[P, T]) -> Callable[P, T]:
-    """Hold the libraries of linear algebra to one thread in a function, whatever the environment says."""
+    """Hold the libraries of linear algebra to one thread in a function, whatever the environment says.
+
+    The function has room for the frames of what it calls (`rubhpc.frames`).
+    """
 
     @wraps(function)
     def held(*args: P.args, **kwargs: P.kwargs) -> T:
         with one_thread():
-            return function(*args, **kwargs)
+            return with_room(function, *args, **kwargs)
 
     return held
 

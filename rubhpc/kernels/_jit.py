@@ -13,12 +13,12 @@ from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from itertools import chain
 from pathlib import Path
-from types import FunctionType
 from typing import Any, TypeVar
 
 import numba
 from numba.core.compiler_lock import global_compiler_lock
 
+from rubhpc.frames import with_room
 from rubhpc.kernels._compiler import (
     ApartCompiler,
     Flags,
@@ -108,17 +108,6 @@ class Compilation:
 compilation = Compilation()
 
 
-def _call(function: Callable[[Any], Any], given: Any) -> Any:
-    return function(given)
-
-
-# Python takes memory for frames in blocks of 16 kB. Where the calls of a loop cross the end of a block, each
-# takes another and frees it: up to half of the time of a compilation. This frame takes more than half a block
-# of 1 MB, and the frames of what it calls follow in that block.
-_WORDS = 70_000
-_with_room = FunctionType(_call.__code__.replace(co_stacksize=_WORDS), globals())
-
-
 @contextmanager
 def _alone_with(lock: Path) -> Iterator[None]:
     """Wait until no other process compiles a kernel: this process would repeat the work.
@@ -171,7 +160,7 @@ def _stamped(compiled: Any) -> Any:
         if tuple(signature) in compiled.overloads or _is_cached(compiled, signature):
             return compile_or_load(signature)
         with compilation.of(compiled.py_func.__name__, compiled.lock):
-            return _with_room(compile_or_load, signature)
+            return with_room(compile_or_load, signature)
 
     compiled.compile = compile_once
     return compiled
