@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 _LONG = _STICK, _CURVED = "for friction with stick", "for curved gaps"  # parts that take more than a minute
 # Kernels with their own announcement -> purpose; they are compiled when a case first needs them.
 _PARTS = {
-    "advance_by_course": _STICK,
+    "advance_friction": _STICK,
     "advance_by_steps": "for contact in short steps",
     "advance_curved": _CURVED,
     "follow_revolutions": "for periodic motions",

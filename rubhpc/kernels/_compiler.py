@@ -127,7 +127,8 @@ class _FieldLowering(BaseNativeLowering):
 class _Inlining(InlineInlinables):
     """Numba's inlining without its copies of functions that are read anew for each call.
 
-    It copies them twice, and with each block all of the function's variables.
+    It copies them twice, and with each block all of the function's variables. Numba compiles in one thread
+    at a time, so that no other compilation misses its copies.
     """
 
     _name = "inlining_without_copies"

@@ -381,7 +381,7 @@ def whip() -> None:
 
         setattr(module, name, call)
 
-    timed(friction_march, "advance_by_course", lambda given: "recorded" if given[5] else "transient")
+    timed(friction_march, "advance_friction", lambda given: "recorded" if given[5] else "transient")
     timed(tangent_motion, "carry_along", lambda given: "tangent")
     rounds = []
     for _ in range(11):

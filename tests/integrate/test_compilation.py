@@ -15,7 +15,7 @@ def test_each_part_is_announced_once(monkeypatch):
     with compilation.announced_by(texts.append):
         for name in ("enter_with", "advance", "carry_along", "enter_with", "carry_along", "advance_by_steps"):
             _jit.compilation.began(name)
-        _jit.compilation.began("advance_by_course")
+        _jit.compilation.began("advance_friction")
     assert _jit.compilation.began is before
     common, longer = (f"once after an installation: {t}" for t in ("up to a minute", "one to three minutes"))
     assert texts == [
@@ -29,7 +29,7 @@ def test_each_part_is_announced_once(monkeypatch):
 def test_parts_are_names_of_kernels():
     from rubhpc.kernels import (
         curved_loop,
-        friction_course,
+        friction_kernel,
         linear_theory,
         piece_loop,
         revolutions,
@@ -39,7 +39,7 @@ def test_parts_are_names_of_kernels():
     )
 
     modules = (
-        revolutions, shooting, linear_theory, tangent, stepping_loop, curved_loop, friction_course, piece_loop
+        revolutions, shooting, linear_theory, tangent, stepping_loop, curved_loop, friction_kernel, piece_loop
     )  # fmt: skip
     kernels = {name for module in modules for name in vars(module)}
     assert all(name in kernels for name in compilation._PARTS)

@@ -23,7 +23,7 @@ from rubhpc.kernels.case_progress import (
 )
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE, ModeTables
 from rubhpc.kernels.earlier_spans import earlier_spans, forget_earlier, no_earlier_spans
-from rubhpc.kernels.friction_course import advance_by_course
+from rubhpc.kernels.friction_kernel import advance_friction
 from rubhpc.kernels.friction_spans import new_spans
 from rubhpc.kernels.pieces import NO_PIECES
 from rubhpc.kernels.trail import BROKEN
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
     from rubhpc.kernels.accumulators import Accumulator, Samples
+    from rubhpc.kernels.event_forces import FrictionWork
     from rubhpc.kernels.pieces import Pieces
     from rubhpc.kernels.trail import Trail
     from rubhpc.kernels.transitions import Transitions
@@ -159,16 +160,11 @@ class FrictionMarch(StateSets):
             if outcome == FINISHED:
                 sections[k] = self.motion()
             return outcome
-        outcome = self._advance_sections_in_closed_form(samples, accumulator, sections)
+        outcome = self._by_kernel(self._work, self.transitions, samples, accumulator, sections=sections)
         if outcome == CONTACT_UNSOLVED:
             self._hand_over()
             return PAUSED
         return outcome
-
-    def _advance_sections_in_closed_form(
-        self, samples: Samples, accumulator: Accumulator, sections: Floats
-    ) -> int:
-        return self._on_course(samples, accumulator, self.transitions, sections=sections)
 
     def _kernel(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
         while True:
@@ -182,28 +178,25 @@ class FrictionMarch(StateSets):
             self._hand_over()
 
     def _advance(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
-        return self._on_course(samples, accumulator, self.transitions, (last_tick, is_recorded))
+        return self._by_kernel(self._work, self.transitions, samples, accumulator, (last_tick, is_recorded))
 
     def _advance_pieces(self, pieces: Pieces, samples: Samples, sums: Accumulator) -> int:
-        work = self._work
-        self._work = work._replace(earlier=self._no_earlier)  # a mode is another one in the next piece
-        try:
-            return self._on_course(samples, _NO_RECORD, NO_TRANSITIONS, pieces=pieces, sums=sums)
-        finally:
-            self._work = work
+        work = self._work._replace(earlier=self._no_earlier)  # a mode is another one in the next piece
+        return self._by_kernel(work, NO_TRANSITIONS, samples, _NO_RECORD, pieces=pieces, sums=sums)
 
-    def _on_course(
+    def _by_kernel(
         self,
+        work: FrictionWork,
+        transitions: Transitions,
         samples: Samples,
         accumulator: Accumulator,
-        transitions: Transitions,
         to: tuple[int, bool] = (0, False),
         sections: Floats = _NO_SECTIONS,
         pieces: Pieces = NO_PIECES,
         sums: Accumulator = _NO_SUMS,
     ) -> int:
-        """Advance through pieces, by sections, or `to` a tick, recorded or not."""
-        return advance_by_course(
+        """Advance by the kernel: through pieces, by sections, or `to` a tick, recorded or not."""
+        return advance_friction(
             self.tables,
             self.bodies,
             self._friction,
@@ -218,7 +211,7 @@ class FrictionMarch(StateSets):
             self._z,
             self._z_next,
             self._motion,
-            self._work,
+            work,
             self._recorder,
             samples,
             accumulator,

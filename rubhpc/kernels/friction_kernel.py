@@ -1,6 +1,7 @@
-"""The kernel of set-valued friction that Python calls: it compiles what all courses of a case share once.
+"""The kernel of set-valued friction that Python calls.
 
-The loop from event to event takes two minutes to compile, as long in each kernel that holds it.
+A case advances in three ways that share the loop from event to event. The loop is most of what there is to
+compile (90 s): in one kernel it is compiled once.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ Floats = NDArray[np.float64]
 
 
 @jit_lean_sum
-def advance_by_course(
+def advance_friction(
     tables: ModeTables,
     reduced: Reduced,
     bodies: FrictionBodies,
@@ -51,21 +52,21 @@ def advance_by_course(
     accumulator: Accumulator,
     transitions: Transitions,
 ) -> int:
-    """Advance a case through pieces, where there are any; else by sections, likewise; else to `last_tick`.
+    """Advance a case through `pieces` if there are any, by `sections` if there are any, else to `last_tick`.
 
     Parameters
     ----------
-    last_tick, is_recorded
+    last_tick : int, is_recorded : bool
         Of `friction_loop.advance_with_friction`.
-    sections, limit, energy_limit
-        Of `friction_sections.advance_friction_sections`; without any, sections are (0, 2 n).
-    pieces, sums
-        Of `friction_pieces.advance_friction_pieces`; without any, they are `NO_PIECES` and of no rows.
+    sections : (n_revolution, 2 n), limit : m, energy_limit : J
+        Of `friction_sections.advance_friction_sections`; without sections, n_revolution is 0.
+    pieces : Pieces, sums : Accumulator
+        Of `friction_pieces.advance_friction_pieces`; without pieces, `NO_PIECES` and no rows.
 
     Returns
     -------
     int
-        As that function.
+        Outcome of that function.
     """
     if pieces.spin.size > 0:
         return advance_friction_pieces(
