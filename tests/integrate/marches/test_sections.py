@@ -76,15 +76,16 @@ def test_revolution_in_short_steps_stands_among_the_others(monkeypatch):
     exact, left = march_of({"friction_law": "coulomb"}), march_of({"friction_law": "coulomb"})
     idle = idle_of(exact)
     expected, _ = exact.pass_sections(N, *idle)
-    follow, n_call = FrictionMarch._advance_sections_in_closed_form, []
+    follow, n_call = FrictionMarch._by_kernel, []
 
-    def unsolved_at_first(march, *args):
-        n_call.append(1)
-        return CONTACT_UNSOLVED if len(n_call) == 1 else follow(march, *args)
+    def unsolved_at_first(march, *args, **kwargs):
+        n_call.append(kwargs.keys())
+        return CONTACT_UNSOLVED if len(n_call) == 1 else follow(march, *args, **kwargs)
 
-    monkeypatch.setattr(FrictionMarch, "_advance_sections_in_closed_form", unsolved_at_first)
+    monkeypatch.setattr(FrictionMarch, "_by_kernel", unsolved_at_first)
     sections, reason = left.pass_sections(N, *idle)
     assert (reason, left.n_left, left.sample) == (None, 1, 0)
+    assert n_call[0] == {"sections"}
     n = expected.shape[1] // 2
     apart = np.linalg.norm((sections - expected)[:, :n], axis=1) / np.linalg.norm(expected[:, :n], axis=1)
     assert 0.0 < apart.max() < 1e-3
