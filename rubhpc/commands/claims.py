@@ -52,6 +52,6 @@ def claims(number: int | None, stores: str, is_json: bool, document: str | None,
 
 def _write(path: Path, content: str) -> None:
     try:
-        path.write_text(content)
+        path.write_text(content, encoding="utf-8")
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror}; choose another --document") from error

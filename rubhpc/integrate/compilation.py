@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from numba.core import event
 
+from rubhpc.kernels._cache import temporary_folder
 from rubhpc.kernels._jit import compilation
 
 if TYPE_CHECKING:
@@ -43,6 +44,9 @@ def announce_by(announce: Callable[[str], None]) -> None:
     """Call `announce` before kernels that are in no cache are compiled, once for each part of the program."""
 
     def begin(name: str) -> None:
+        place = temporary_folder()
+        if place is not None and not _announced:
+            announce(f"compiled kernels are kept in {place}; set NUMBA_CACHE_DIR to a folder that lasts")
         part = _PARTS.get(name, "")
         if part not in _announced:
             _announced.add(part)

@@ -79,7 +79,7 @@ class Holder:
 def process_state(pid: int) -> tuple[str, int, str] | None:
     """State letter, parent and birth (ticks after boot) of a process on this host; None: no such process."""
     try:
-        text = Path(f"/proc/{pid}/stat").read_text()
+        text = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace")
     except OSError:
         # Without /proc only existence can be checked.
         try:
