@@ -82,6 +82,7 @@ SLOW = (
     "integrate/test_tangent_motion.py::test_tangent_is_that_of_the_saltation_matrices[ring",
     "integrate/test_transient.py::test_laws_without_closed_form_settle_as_with_auto",
     "kernels/test_accumulators.py",
+    "kernels/test_cache.py",
     "kernels/test_complementarity.py",
     "kernels/test_contact_pairs.py",
     "kernels/test_coulomb_friction.py",

@@ -57,7 +57,7 @@ def call_rig_function(path: Path, function: str, where: str) -> Any:
         lines = [frame.lineno for frame in frames if frame.filename == module.__file__]
         line = getattr(error, "lineno", None) or (lines[-1] if lines else None)
         at = f"line {line}: " if line else ""
-        message = " ".join(str(error).split())[:200]
-        raise InputError(f"{named}: {at}{type(error).__name__}: {message}; fix the rig file") from error
+        texts = (type(error).__name__, " ".join(str(error).split())[:200])
+        raise InputError(f"{named}: {at}{': '.join(filter(None, texts))}; fix the rig file") from error
     finally:
         sys.path.remove(folder)

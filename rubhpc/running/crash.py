@@ -29,5 +29,5 @@ def crash(error: BaseException, directory: Path | None = None) -> Crashed:
         place = f"the traceback is in {log}"
     except OSError as trouble:
         place = f"its traceback could not be written ({trouble})"
-    text = " ".join(str(error).split())
-    return Crashed(f"rank {launch().rank}: {type(error).__name__}: {text}; {place}; please report it")
+    what = ": ".join(filter(None, (type(error).__name__, " ".join(str(error).split()))))
+    return Crashed(f"rank {launch().rank}: {what}; {place}; please report it")

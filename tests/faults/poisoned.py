@@ -5,7 +5,7 @@ Run as `python poisoned.py MODE STUDY...`, where MODE is one of
 - cases: friction 0.3 raises, 0.5 never ends, 0.7 yields what is no number;
 - segfault, killed: friction 0.3 ends its process by a fatal signal, by SIGKILL as for want of memory;
 - stuck: friction 0.3 never comes back to be asked whether its time is over;
-- rank1: the second rank has a slip in the program itself;
+- rank1, exit1: the second rank has a slip in the program itself, or calls `sys.exit()`;
 - counted: every case that has been computed is a line in the file COUNT.
 """
 
@@ -55,10 +55,12 @@ def poisoned(setup: Any, *, friction: float, check: Any, **rest: Any) -> Any:
 
 
 def slip(*_: Any) -> None:
+    if mode == "exit1":
+        sys.exit()
     raise LookupError("a slip")
 
 
-if mode != "rank1":
+if mode not in ("rank1", "exit1"):
     worker.run_case = poisoned
     watchdog.PATIENCE = 1.0
 elif launch().rank == 1:

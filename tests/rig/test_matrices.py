@@ -161,6 +161,12 @@ def test_matrices_are_the_identity_of_a_study_not_what_made_them(tmp_path):
     [
         ("def build():\n    return 1 / 0\n", "rig.py:build", "line 2: ZeroDivisionError: division by zero"),
         ("def build(:\n", "rig.py:build", "line 1: SyntaxError"),
+        (
+            "import sys\ndef build():\n    sys.exit()\n",
+            "rig.py:build",
+            "line 3: SystemExit; fix the rig file",
+        ),
+        ("raise GeneratorExit('no')\n", "rig.py:build", "line 1: GeneratorExit: no; fix the rig file"),
         ("import nothing_of_this_name\n", "rig.py:build", "line 1: ModuleNotFoundError"),
         ("def build():\n    return 3\n", "rig.py:build", "returned a int; return a rubhpc.Rig"),
         ("build = 3\n", "rig.py:build", "has no function build"),
