@@ -15,7 +15,7 @@ import xarray as xr
 from running import array_of, journalled_cases, write_sample, write_study
 from stub_physics import Physics, record
 
-from rubhpc.errors import InputError, StoppedEarly, StoreError
+from rubhpc.errors import InputError, RubError, StoppedEarly, StoreError
 from rubhpc.kernels._jit import compilation
 from rubhpc.running import case_setup, computing, driver, job, stopping, worker
 from rubhpc.running.driver import run
@@ -325,7 +325,7 @@ def test_an_error_of_the_programs_own_leaves_its_traceback_in_a_log(physics, stu
         raise LookupError("a slip")
 
     monkeypatch.setattr(worker.Worker, "work", burst)
-    with pytest.raises(driver.RubError, match="LookupError: a slip") as reported:
+    with pytest.raises(RubError, match="LookupError: a slip") as reported:
         run(study, quiet=True)
     assert reported.value.exit_code == 70
     (log,) = (study.output / ".rubhpc" / "logs").iterdir()
