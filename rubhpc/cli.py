@@ -98,8 +98,8 @@ def commands() -> None:
 
     `mpirun -n N rubhpc STUDY.toml` runs a study on N ranks; the same command continues it after a stop.
 
-    Exit codes: 0 complete; 1 finished, some cases failed; 2 bad input or output; 3 store cannot be used; 70 an internal
-    error; 71 complete, but a rank was lost; 75 stopped early, run the same command again.
+    Exit codes: 0 complete; 1 finished, some cases failed; 2 bad input or output; 3 store cannot be used;
+    70 an internal error; 71 complete, but a rank was lost; 75 stopped early, run the same command again.
     """
 
 

@@ -17,7 +17,7 @@ from stub_physics import Physics, record
 
 from rubhpc.errors import InputError, RubError, StoppedEarly, StoreError
 from rubhpc.kernels._jit import compilation
-from rubhpc.running import case_setup, computing, driver, job, stopping, worker
+from rubhpc.running import case_setup, computing, job, stopping, worker
 from rubhpc.running.driver import run
 from rubhpc.running.pool import Alone
 from rubhpc.running.preparations import count_preparations
