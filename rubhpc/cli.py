@@ -115,7 +115,7 @@ def main(args: list[str] | None = None) -> None:
                 f"standard output: {problem()}; what was printed is incomplete, write it to another place",
                 code or (2 if _prints_results(given) else 0),
             )
-    leave(code)
+        leave(code)
 
 
 def _code_of(args: list[str]) -> int:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from rubhpc.running.knocks_on_ranks import least_knock_on, take_part
 from rubhpc.running.pool import Alone
 from rubhpc.running.workers import start_workers
+from rubhpc.streams import lasting_streams
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from rubhpc.study.study import Study
 
 
+@lasting_streams()
 def least_knock(
     study: Study,
     *,

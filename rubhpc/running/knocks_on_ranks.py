@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
 
 @on_one_thread
-@lasting_streams()
 def least_knock_on(
     pool: Pool,
     read: Callable[[], Study],
