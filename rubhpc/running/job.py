@@ -54,6 +54,8 @@ class Job:
     suspect : dict
         Flat index -> deaths of ranks in this case or one of its predecessors; these cases come last, each by
         itself, those of a sweep in order.
+    deadly : set of int
+        Those of them in which ranks died themselves: they are first computed in a process of their own.
     token : str
         Of the lock on the store.
     refinement : Refinement, optional
@@ -69,6 +71,7 @@ class Job:
     missing: NDArray[np.bool_]
     pending: NDArray[np.int64]
     suspect: dict[int, int]
+    deadly: set[int]
     token: str
     refinement: Refinement | None = None
 
@@ -124,6 +127,7 @@ def prepare_job(request: RunRequest, n_rank: int) -> Job:
         missing=missing,
         pending=pending,
         suspect=suspect,
+        deadly=set(deaths),
         token=request.token,
         refinement=refinement,
     )

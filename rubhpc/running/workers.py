@@ -102,7 +102,7 @@ class Parent(_Shared):
                     [sys.executable, "-m", f"{__package__}.worker_process"]
                     + [str(number) for number in (*handles, rank, self.size, os.getpid())],
                     pass_fds=handles,
-                    env=_environment(),
+                    env=environment(),
                     stdin=subprocess.DEVNULL,
                     start_new_session=True,  # Ctrl-C is passed on by the parent, as other signals are
                 )
@@ -240,6 +240,13 @@ def start_workers(count: int) -> Iterator[Parent]:
 def join(arguments: list[str]) -> Child:
     """Join the run that started this process with these arguments, and end with its parent."""
     pipe, file, rank, size, parent = map(int, arguments)
+    end_with(parent)
+    move_to(rank, size)
+    return Child(Connection(pipe), Sums(file), rank, size)
+
+
+def end_with(parent: int) -> None:
+    """End this process soon after its parent has died."""
 
     def watch() -> None:
         while os.getppid() == parent:
@@ -247,11 +254,9 @@ def join(arguments: list[str]) -> Child:
         os._exit(_ORPHANED)
 
     threading.Thread(target=watch, name="parent watch", daemon=True).start()
-    move_to(rank, size)
-    return Child(Connection(pipe), Sums(file), rank, size)
 
 
-def _environment() -> dict[str, str]:
+def environment() -> dict[str, str]:
     """That of a worker: one thread, and this very package."""
     place = str(Path(__file__).parents[2])
     path = os.pathsep.join(filter(None, [place, os.environ.get("PYTHONPATH", "")]))
