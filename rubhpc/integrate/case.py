@@ -82,6 +82,7 @@ def run_case(
     recording: Recording,
     initial: State | Initial | None = None,
     check: Callable[[], None] | None = None,
+    say: Callable[[str], None] = lambda _: None,
 ) -> Record:
     """Integrate one case and measure it.
 
@@ -96,6 +97,8 @@ def run_case(
         final state of another case is fitted to the gaps of this one (`initial_state.fit_to_gaps`).
     check : callable, optional
         Called between kernel calls, a quarter of a second apart at most; what it raises ends the case.
+    say : callable
+        Called with the progress of the case as often as `check`, if that is given.
     """
     began = time.perf_counter() - seconds_compiling()
     compile_ahead(setup)
@@ -105,7 +108,18 @@ def run_case(
         state = start_of(initial or Initial(), setup, clearance)
 
     def starter(scheme: Scheme) -> Callable[[State], March]:
-        return lambda state: march_of(scheme, setup)(setup, clearance, friction, state, check)
+        def start(state: State) -> March:
+            def look() -> None:
+                assert check is not None
+                check()
+                say(reached(march.sample / setup.samples_per_revolution))
+
+            march = march_of(scheme, setup)(
+                setup, clearance, friction, state, None if check is None else look
+            )
+            return march
+
+        return start
 
     scheme = setup.scheme
     try:
@@ -123,6 +137,13 @@ def run_case(
         record = replace(record, final=with_overlap(record.final, setup, clearance))
     record.measures["wall_time"] = time.perf_counter() - seconds_compiling() - began
     return record
+
+
+def reached(revolution: float) -> str:
+    """Where a case is, whose record begins at revolution 0."""
+    if revolution < 0.0:
+        return f"a case at revolution {revolution:.0f}, its record begins at 0"
+    return f"a case at revolution {revolution:.0f} of its record"
 
 
 def compile_kernels(

@@ -181,6 +181,7 @@ class Worker:
             return Entry(flat, case.id, FAILED, reason=_reason(error))
         finally:
             self.watch.end()
+            self.say("")
         remark = "; ".join(text for text in (start.note, record.remark) if text)
         return Entry(flat, case.id, record.status, case_checksum(data, i_case), measures, remark)
 
@@ -211,14 +212,10 @@ def record_of(
     study = grid.study
     if study.branch is not None:
         axis = study.axis(study.branch.along)
-        operation = operation_of(grid, case)
-        try:
-            return record_branches(operation, study.branch, axis, study.recording, check, say)
-        finally:
-            say("")
+        return record_branches(operation_of(grid, case), study.branch, axis, study.recording, check, say)
     setup = setups.of(case)
     initial = case.initial if state is None else State.unpacked(state, setup.model)
-    return integrate(study, case, setup, initial, check)
+    return integrate(study, case, setup, initial, check, say)
 
 
 def integrate(
@@ -227,6 +224,7 @@ def integrate(
     setup: Setup,
     initial: State | Initial,
     check: Callable[[], None] | None = None,
+    say: Callable[[str], None] = lambda _: None,
 ) -> Record | RunUpRecord:
     """The record of a case, at its speed or over its speeds; `check` is called several times a second."""
     if case.speed_law is None:
@@ -237,6 +235,7 @@ def integrate(
             recording=study.recording,
             initial=initial,
             check=check,
+            say=say,
         )
     return record_run_up(
         setup,
@@ -246,6 +245,7 @@ def integrate(
         recording=study.recording,
         initial=initial,
         check=check,
+        say=say,
     )
 
 
