@@ -152,7 +152,11 @@ class Passing:
         if library is None:
             self._at = setup if march.has_piece_loop else None
             return None
-        found = take_stretch(march, library, block, first, room, begun, earlier, self._check)
+
+        def look(piece: int) -> None:
+            self._look(block[min(piece, len(block) - 1)])
+
+        found = take_stretch(march, library, block, first, room, begun, earlier, look)
         if found is not None:
             self._left, self._lasted = found.left, float(block.interval[first + found.n_piece - 1]) * n_sample
         return found
