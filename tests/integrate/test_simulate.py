@@ -269,7 +269,7 @@ def test_a_case_says_where_it_is():
     said = []
     run(check=lambda: None, say=said.append)
     assert said[0] == "a case at revolution -1, its record begins at 0"
-    assert said[-1] == "a case at revolution 1 of its record"
+    assert said[-1] == "a case at revolution 0 of its record"
 
 
 def test_check_may_drop_the_case():
