@@ -12,7 +12,16 @@ import numpy as np
 
 from rubhpc.integrate.ahead import compile_ahead
 from rubhpc.integrate.closed_form_case import exponents_of, give_back, judge_of, trail_of
-from rubhpc.integrate.compilation import seconds_compiling
+from rubhpc.integrate.compilation import (
+    COMMON,
+    CURVED,
+    NEIGHBOURS,
+    PERIODIC,
+    RUN_UPS,
+    STEPS,
+    STICK,
+    seconds_compiling,
+)
 from rubhpc.integrate.initial_state import fit_to_gaps, with_overlap
 from rubhpc.integrate.marched_record import Marched, march_record
 from rubhpc.integrate.marches.central_difference import CentralDifferenceMarch
@@ -40,6 +49,8 @@ from rubhpc.integrate.repeated_record import KnownMotion, repeat_period
 from rubhpc.integrate.scheme import Scheme
 from rubhpc.integrate.start import start_of
 from rubhpc.integrate.transient import pass_revolutions, pass_transient
+from rubhpc.kernels._jit import plain
+from rubhpc.kernels.laws import is_set_valued
 from rubhpc.schema import DONE, SECTION_NAMES
 from rubhpc.spectra import amplitude_spectrum
 from rubhpc.study.initial import Initial
@@ -144,6 +155,18 @@ def reached(revolution: float) -> str:
     if revolution < 0.0:
         return f"a case at revolution {revolution:.0f}, its record begins at 0"
     return f"a case at revolution {revolution:.0f} of its record"
+
+
+def kernel_sets(setup: Setup, *, changes_speed: bool = False) -> set[str]:
+    """Return the sets of kernels that a case of this set-up may need (`compilation`)."""
+    if not isinstance(setup, ModalSetup):
+        return {COMMON}
+    sets = {COMMON, RUN_UPS} if changes_speed else {COMMON, NEIGHBOURS}
+    if setup.scheme is Scheme.CONTACT_STEPPING:
+        return sets | {STEPS}
+    if setup.scheme is Scheme.CURVED:
+        return sets | {CURVED}
+    return sets | {PERIODIC} | ({STICK} if plain(is_set_valued)(setup.law) else set())
 
 
 def compile_kernels(

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.case import compile_kernels
+from rubhpc.integrate.case import compile_kernels, kernel_sets
+from rubhpc.integrate.compilation import expect_sets
 from rubhpc.running.beginning import begin, begin_part
 from rubhpc.running.case_setup import set_up_for_kernels
 from rubhpc.running.stopping import Stopped, Stopping
@@ -198,9 +199,13 @@ def _warm_up(grid: CaseGrid, block: Block, stopping: Stopping) -> None:
             raise Stopped
 
     with suppress(Exception):  # an error will be reported as the reason of these cases
-        for case in grid.with_each_law(block.start):
+        cases = grid.with_each_law(block.start)
+        setups = [set_up_for_kernels(grid.study, case) for case in cases]
+        changes = cases[0].speed_law is not None
+        expect_sets(set().union(*(kernel_sets(setup, changes_speed=changes) for setup in setups)))
+        for case, setup in zip(cases, setups, strict=True):
             compile_kernels(
-                set_up_for_kernels(grid.study, case),
+                setup,
                 clearance=case.clearance,
                 friction=case.friction,
                 recording=grid.study.recording,
