@@ -1,7 +1,7 @@
 """Reference tables from the declarations themselves: keys of files, commands, variables, Python names.
 
 A page asks for one by a comment, `<!-- generated: study -->`. Tables of keys and variables are in the pages
-themselves, up to `<!-- end -->`, so that the repository shows them; `python docs/site/reference_tables.py` writes
+themselves, up to `<!-- end -->`, for readers of the repository; `python docs/site/reference_tables.py` writes
 them there, and a test holds them to the code.
 """
 
