@@ -12,6 +12,7 @@ from postproc.figures.overlay import overlaid
 from postproc.figures.small_multiples import write_over
 from postproc.signals.lines import SPIKE, spikes, strongest_lines
 from postproc.signals.spectra import signal_or_whirl, spectrum_data
+from postproc.store.rig_of_case import frequencies_at_speed
 from postproc.store.units import scale_of, short_name
 from postproc.store.variables import require_results
 
@@ -41,7 +42,8 @@ def spectrum(
 ) -> Drawing:
     """Amplitude spectrum of a signal.
 
-    Its strongest lines are named as fractions of the spin speed, and printed.
+    Its strongest lines are named, and printed: as fractions of the spin speed where the period of the motion
+    proves them, else by decimals and the natural frequency that is near.
 
     Parameters
     ----------
@@ -65,7 +67,8 @@ def spectrum(
     shown = spectrum_data(cases, signal_or_whirl(signal, full), over).compute()
     abscissa = "order" if orders else "frequency"
     limit = max or default_limit(shown, abscissa)
-    found = strongest_lines(shown, lines) if over is None and lines else None
+    natural = frequencies_at_speed(cases) if "rig" in cases.attrs and over is None else None
+    found = strongest_lines(shown, lines, natural=natural) if over is None and lines else None
     return Drawing(
         shown=shown.to_dataset(name=str(shown.name)),
         draw=lambda axes: draw_spectrum(shown, axes[0], found, abscissa, limit, log),
@@ -154,11 +157,14 @@ def _name_lines(ax: Axes, lines: xr.Dataset, factor: float, abscissa: str) -> No
         taken.append((across, up))
         side = ("right" if x < 0 else "left") if is_full else "center"
         text = str(lines["name"].values[i])
+        if near := str(lines["near"].values[i]) if "near" in lines else "":
+            text = f"{text}\n{near}"
         style: dict[str, Any] = {"ha": side, "va": "bottom", "fontsize": 6.5}
         ax.annotate(text, (x, y), xytext=(0, 1.5), textcoords="offset points", annotation_clip=True, **style)
 
 
 def _table(lines: xr.Dataset, unit: str) -> Iterator[str]:
-    columns = (lines[n].values for n in ("name", "frequency", "amplitude"))
-    for name, frequency, amplitude in zip(*columns, strict=True):
-        yield f"{name:>8} {frequency:10.3f} Hz  {amplitude:.4e} {unit}"
+    columns = (lines[n].values for n in ("name", "frequency", "amplitude", "near"))
+    for name, frequency, amplitude, near in zip(*columns, strict=True):
+        remark = f"  near the {near}" if near else ""
+        yield f"{name:>8} {frequency:10.3f} Hz  {amplitude:.4e} {unit}{remark}"

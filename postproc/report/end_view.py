@@ -73,7 +73,7 @@ def tip_and_root(stator: AnyStator, radius: float) -> tuple[Point, Point]:
 
 def _stator(frame: Frame, stator: AnyStator, tip: Point, root: Point) -> str:
     """Return a beam, or a box for a body without a shape, turned into its place, with the wall behind it."""
-    height = stator.height if isinstance(stator, Stator) else 0.0
+    height = stator.sides[1] if isinstance(stator, Stator) else 0.0
     half = max(frame.scale * height / 2, LEAST / 2 if height else 7.0)
     deep = frame.scale * math.hypot(root[0] - tip[0], root[1] - tip[1])
     is_wall = isinstance(stator, LumpedStator) and stator.rigid

@@ -114,10 +114,9 @@ def _disc(frame: Frame, at: float, disc: Disc) -> str:
 def _stator(frame: Frame, at: float, stator: AnyStator, radius: float) -> str:
     (_, tip), (_, root) = tip_and_root(stator, radius)
     is_beam = isinstance(stator, Stator)
-    width = max(
-        frame.scale * (stator.width if isinstance(stator, Stator) else 0.0), LEAST if is_beam else 14.0
-    )
-    high = max(frame.scale * (stator.height if isinstance(stator, Stator) else 0.0), LEAST)
+    along, across = stator.sides if isinstance(stator, Stator) else (0.0, 0.0)
+    width = max(frame.scale * along, LEAST if is_beam else 14.0)
+    high = max(frame.scale * across, LEAST)
     top, bottom = sorted((frame.y(tip), frame.y(root)))
     kind = "stator" if is_beam else "stator lumped"
     if bottom - top < high:  # it points at the reader, or away

@@ -137,8 +137,24 @@ def spectrum_data(store: xr.Dataset, signal: str, over: str | None = None) -> xr
     store : Dataset
         One case (and one stator, for a stator's signals), or cases along the axis `over`.
     """
-    spectrum, data = periodic_spectrum(store, signal, [find_axis(store, over)] if over else [])
+    spread = [find_axis(store, over)] if over else []
+    spectrum, data = periodic_spectrum(store, signal, spread)
+    period = proven_period(store, spread)
+    if period is not None:
+        spectrum = spectrum.assign_coords(period=period)
     return with_frequency(spectrum, data["spin_speed"].compute())
+
+
+def proven_period(store: xr.Dataset, spread: Iterable[str] = ()) -> xr.DataArray | None:
+    """Return the revolutions after which each case repeats, 0 where it does not or had not settled.
+
+    None for a store without periods.
+    """
+    if "period" not in store:
+        return None
+    data = narrow(store, [name for name in ("period", "settled") if name in store], spread).compute()
+    is_settled = data["settled"] != 0 if "settled" in data else True
+    return data["period"].where(is_settled, 0).drop_attrs()
 
 
 def with_frequency(spectrum: xr.DataArray, spin_speed: xr.DataArray) -> xr.DataArray:

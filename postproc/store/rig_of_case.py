@@ -59,6 +59,19 @@ def natural_frequencies(case: xr.Dataset, along: str | None = None) -> dict[str,
     return _over_rig(case, along, lambda rig: _first_of_kinds(modes(assemble(rig).rotor), ROTOR_MODES))
 
 
+def frequencies_at_speed(case: xr.Dataset) -> dict[str, list[float]]:
+    """Return the natural frequencies (Hz) of the rotor at the speed of one case, without contact, by kind."""
+    from rubhpc.fem.assemble import assemble
+    from rubhpc.fem.modes import modes
+
+    spin = float(case["spin_speed"])
+    found: dict[str, list[float]] = {}
+    for mode in modes(assemble(rig_of(case)).rotor, spin):
+        if mode.frequency > 0.0:
+            found.setdefault(mode.kind, []).append(mode.frequency)
+    return found
+
+
 def stator_frequencies(case: xr.Dataset, along: str | None = None) -> dict[str, xr.DataArray]:
     """Return the first lateral natural frequency of the stator selected, or of the first, Hz; see above."""
     from rubhpc.fem.assemble import assemble

@@ -204,8 +204,7 @@ def rotor_element(section: ShaftSection) -> Element:
 def stator_element(stator: Stator) -> Element:
     """Return the element of a stator: (6, 6), degrees `STATOR_DEGREES` at each node, from root to tip."""
     L = stator.length / stator.elements
-    area = stator.width * stator.height
-    second_moment = stator.width * stator.height**3 / 12
+    area, second_moment = stator.area, stator.second_moment
     E, rho = stator.youngs_modulus, stator.density
     flexural_rigidity, shear_rigidity = _bending_rigidities(stator)
     translational, rotary, flexural = bending(
@@ -232,5 +231,6 @@ def stator_foreshortening(stator: Stator) -> Matrix:
 def _bending_rigidities(stator: Stator) -> tuple[float, float]:
     """E I (N m^2) and kappa G A (N) of a stator."""
     E, nu = stator.youngs_modulus, stator.poissons_ratio
-    shear = shear_coefficient_rectangle(nu) * E / (2 * (1 + nu)) * (stator.width * stator.height)
-    return E * (stator.width * stator.height**3 / 12), shear
+    is_round = stator.diameter is not None
+    coefficient = shear_coefficient_circle(nu) if is_round else shear_coefficient_rectangle(nu)
+    return E * stator.second_moment, coefficient * E / (2 * (1 + nu)) * stator.area

@@ -92,6 +92,7 @@ class Computing:
                 is_mine = n_sequence % self._pool.size == self._pool.rank  # a block has one writer
                 if is_mine and not self._stopping.look():
                     worker.missing = np.arange(self._grid.n_case) == flat
+                    worker.is_wary = flat in job.deadly
                     worker.work(block)
 
     def _kind_of_tail(self) -> str:

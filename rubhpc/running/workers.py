@@ -255,6 +255,13 @@ def start_workers(count: int, part: Part) -> Iterator[Parent]:
 def join(arguments: list[str]) -> Child:
     """Join the run that started this process with these arguments, and end with its parent."""
     pipe, file, rank, size, parent = map(int, arguments)
+    end_with(parent)
+    move_to(rank, size)
+    return Child(Connection(pipe), Sums(file), rank, size)
+
+
+def end_with(parent: int) -> None:
+    """End this process soon after its parent has died."""
 
     def watch() -> None:
         while os.getppid() == parent:
@@ -262,5 +269,3 @@ def join(arguments: list[str]) -> Child:
         os._exit(_ORPHANED)
 
     threading.Thread(target=watch, name="parent watch", daemon=True).start()
-    move_to(rank, size)
-    return Child(Connection(pipe), Sums(file), rank, size)

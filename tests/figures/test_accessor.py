@@ -8,6 +8,7 @@ import subprocess
 import sys
 from typing import TYPE_CHECKING
 
+import figure_stub
 import matplotlib
 import pytest
 import synthetic_store
@@ -162,3 +163,7 @@ def test_what_run_up_returns_has_figures_though_no_store_was_opened() -> None:
     script = "import rubhpc, xarray; rubhpc.run_up; print(hasattr(xarray.Dataset, 'rub'))"
     found = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
     assert found.stdout.strip() == "True"
+
+
+def test_type_checkers_see_every_figure_as_it_is_declared():
+    assert figure_stub.STUB.read_text() == figure_stub.text()

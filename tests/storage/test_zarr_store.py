@@ -212,6 +212,16 @@ def test_the_same_change_of_all_stators_of_a_ring_is_one_difference(store):
     assert differences(ring(0.03), ring(0.04)) == ["rig.stator.*.length (8 of them) was 0.03, is 0.04"]
 
 
+def test_differences_of_another_rig_are_few(store):
+    def shaft(value):
+        return replace(
+            store.manifest, parts={"physics": value, "rig": {"rotor": {f"key{i}": value for i in range(9)}}}
+        )
+
+    found = differences(shaft(1), shaft(2))
+    assert found == [*(f"rig.rotor.key{i} was 1, is 2" for i in range(3)), "6 more of rig.rotor"]
+
+
 def test_lost_values_of_an_axis_are_written_as_a_study_file_may_state_them(store):
     def over(*speeds):
         axis = replace(store.manifest.axes[0], name="speed", dimension="speed", unit="rad s-1", values=speeds)
