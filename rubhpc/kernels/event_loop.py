@@ -155,8 +155,10 @@ def advance(
             crossing = find_crossing(
                 mask[mode], mode, switch_re, switch_im, rate_re, rate_im, next_re, next_im, overlap
             )
-        if crossing != 0 and level > 0 and not stand_still(
-            crossing, switch_re[mode], switch_im[mode], z_re, z_im, next_re, next_im
+        if (
+            crossing != 0
+            and level > 0
+            and not stand_still(crossing, switch_re[mode], switch_im[mode], z_re, z_im, next_re, next_im)
         ):
             progress.halving_level = level - 1
             continue
