@@ -144,7 +144,7 @@ def run_case(
     record.measures["modal_error"] = setup.modal_error if isinstance(setup, ModalSetup) else math.nan
     if isinstance(setup, ModalSetup) and np.any(record.measures["contact_fraction"] != 0.0):
         record = replace(record, advice=setup.modes_missing)  # without contact no mode is excited
-    if record.final.overlap is None and not (scheme is Scheme.EVENT_DRIVEN and setup.law.stiffness == 0.0):
+    if scheme is not Scheme.EVENT_DRIVEN or setup.law.stiffness > 0.0:
         record = replace(record, final=with_overlap(record.final, setup, clearance))
     record.measures["wall_time"] = time.perf_counter() - seconds_compiling() - began
     return record

@@ -35,7 +35,7 @@ LEAST_FORCE = np.finfo(float).tiny  # N, least force that marks a contact as clo
 MOST_PASSES = 20  # for the curved gap of the updated normal; three or four are usual
 
 
-def fit_to_gaps(state: State, setup: Setup, clearance: float) -> State:
+def fit_to_gaps(state: State, setup: Setup, clearance: float, softness: float = 0.0) -> State:
     """Return a state as the start of a case: no gap overlaps more than before, and none is pulled shut.
 
     Parameters
@@ -44,6 +44,8 @@ def fit_to_gaps(state: State, setup: Setup, clearance: float) -> State:
         Final state of another case; its `overlap` is that allowed by a penalty.
     clearance : float, m
         Radial clearance at rest; a stator's `clearance_offset` is added.
+    softness : float, m/N
+        Overlap that remains, over the force that closes a gap.
 
     Raises
     ------
@@ -62,10 +64,12 @@ def fit_to_gaps(state: State, setup: Setup, clearance: float) -> State:
     if np.any(gap + allowed < -TOLERANCE):
         for _ in range(MOST_PASSES):
             shape = static_shapes(gap_jacobian.T, setup)
-            wanted = _least_forces(gap_jacobian @ shape, gap + allowed - gap_jacobian @ shape @ force)
+            compliance = gap_jacobian @ shape
+            soft = compliance + softness * np.eye(force.size)
+            wanted = _least_forces(soft, gap + allowed - compliance @ force)
             displacement, force = displacement + shape @ (wanted - force), wanted
             gap, gap_jacobian = gaps(displacement, setup, clearance)
-            excess = gap + allowed
+            excess = gap + allowed + softness * force
             if np.all(excess >= -TOLERANCE) and np.all(excess[force > 0.0] <= TOLERANCE):
                 break
         rotor, *stators = setup.model.split(displacement)
@@ -77,13 +81,16 @@ def fit_to_gaps(state: State, setup: Setup, clearance: float) -> State:
 def at_rest(setup: Setup, clearance: float) -> State:
     """Return the shaft at rest under its constant loads, on stators that the sag reaches, without friction.
 
-    Clearance in m; stators carry the weight that rests on them.
+    Clearance in m; stators carry the weight that rests on them, and overlap under a penalty.
     """
     state = State.at_rest(setup.model)
     if not setup.model.sag.any():
         return state
     gap, _ = gaps(state.displacement, setup, clearance)
-    return fit_to_gaps(replace(state, contact_force=np.where(gap < 0.0, LEAST_FORCE, 0.0)), setup, clearance)
+    state = replace(state, contact_force=np.where(gap < 0.0, LEAST_FORCE, 0.0))
+    if not setup.law.stiffness > 0.0:
+        return fit_to_gaps(state, setup, clearance)
+    return with_overlap(fit_to_gaps(state, setup, clearance, 1.0 / setup.law.stiffness), setup, clearance)
 
 
 def with_overlap(state: State, setup: Setup, clearance: float) -> State:

@@ -106,6 +106,13 @@ def test_cycles_of_chaos_lie_on_none(rate):
     assert not is_torus(cycle_distances(whirl.real, whirl.imag, SAMPLES))
 
 
+def test_cycles_that_repeat_exactly_lie_on_none():
+    """As those of a motion that comes to rest in between."""
+    distances = cycle_distances(*np.tile(np.random.default_rng(1).random((2, 3 * SAMPLES)), 8), SAMPLES)
+    distances[distances < 1e-12] = 0.0
+    assert not is_torus(distances)
+
+
 @pytest.mark.parametrize("share", [0.9, 0.95, 0.98])
 def test_cycles_that_settle_lie_on_none(share):
     whirl = settling(share)
