@@ -193,8 +193,10 @@ def _refined(
         roots = np.stack([middle + reach, middle - reach])
     change = np.abs(roots - values)
     nearest = np.take_along_axis(roots, np.argmin(change, axis=0)[np.newaxis], axis=0)[0]
-    is_rounding = change.min(axis=0) <= 100 * EPS * np.abs(values).max()
-    return np.where(is_rounding & (np.abs(values.real) < values.imag), nearest, values), vectors
+    is_better = change.min(axis=0) <= 100 * EPS * np.abs(values).max()
+    for light in (values, nearest):
+        is_better &= np.abs(light.real) < light.imag
+    return np.where(is_better, nearest, values), vectors
 
 
 def _real_pairs(

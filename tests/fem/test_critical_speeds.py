@@ -246,3 +246,14 @@ def test_torsion_that_meets_the_spin_hides_no_critical_speed():
     for high, n in ((1900.0, 3), (3500.0, 5)):
         found = [c.speed for c in find_critical_speeds(model, np.linspace(0.0, high, n))]
         assert found[:4] == pytest.approx(known, rel=1e-6)
+
+
+def test_a_rotor_that_floats_freely_has_critical_speeds():
+    """Its rigid-body modes, eigenvalues of rounding, neither count nor take another mode's place."""
+    section = {"youngs_modulus": 2.1e11, "shear_modulus": 8e10, "density": 7800.0, "outer_diameter": 0.03}
+    disc = Disc(node=6, diameter=0.3, thickness=0.03, density=7800.0)
+    shaft, soft = ShaftSection(length=0.5, elements=5, **section), Bearing(node=1, stiffness=0.0)
+    model = assemble(Rig(name="floating", rotor=Rotor(shaft=(shaft,), disc=(disc,), bearing=(soft,))))
+    for n in (3, 11):
+        found = find_critical_speeds(model, np.linspace(0.0, 5000.0, n))
+        assert [c.speed for c in found] == pytest.approx([743.124361, 3362.413168, 3445.876886], rel=1e-8)
