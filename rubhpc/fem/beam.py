@@ -167,9 +167,10 @@ def _symmetric(a: float, b: float, c: float, d: float, e: float, f: float) -> Ma
 def rotor_elements(tube: Tube, lengths: Sequence[float]) -> list[Element]:
     """Return the elements of a shaft section or sleeve that is cut into `lengths` (m), from its left end.
 
-    They are (12, 12), with degrees `ROTOR_DEGREES` at each node. The slope of v is `thz`, of w `-thy`. A slice
-    of a round shaft has Ip = 2 Id, so by `Id thy'' + spin Ip thz' = My` and `Id thz'' - spin Ip thy' = Mz`, the
-    equations of a disc, the gyroscopic matrix is twice the rotary mass matrix, between the two planes.
+    They are (12, 12), with degrees `ROTOR_DEGREES` at each node. The slope of v is `thz`, of w `-thy`. A
+    slice of a round shaft has Ip = 2 Id, so by `Id thy'' + spin Ip thz' = My` and
+    `Id thz'' - spin Ip thy' = Mz`, the equations of a disc, the gyroscopic matrix is twice the rotary mass
+    matrix, between the two planes.
     """
     outer, inner = tube.diameters
     if outer[0] == outer[1] and inner[0] == inner[1]:

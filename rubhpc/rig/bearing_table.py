@@ -101,7 +101,9 @@ class BearingTable(Support):
     def __post_init__(self) -> None:
         for declared in fields(self):
             value = getattr(self, declared.name)
-            if declared.metadata.get("kind") == "series" and isinstance(value, list | float | int | np.ndarray):
+            if declared.metadata.get("kind") == "series" and isinstance(
+                value, list | float | int | np.ndarray
+            ):
                 object.__setattr__(self, declared.name, tuple(np.atleast_1d(value).tolist()))
         super().__post_init__()
         if len(self.speed) < 2:
