@@ -19,7 +19,7 @@ from rubhpc import (
     read_rig,
     simulate,
 )
-from rubhpc.fem.constraints import find_rigid_body_mode
+from rubhpc.fem.constraints import FLOATS, find_rigid_body_mode
 from rubhpc.fem.modes import modes
 from rubhpc.fem.response import first_lateral_frequency, steady_response
 from rubhpc.rig.bearing_table import BearingTable
@@ -281,7 +281,7 @@ def test_free_motion_is_found_where_contact_or_outputs_see_it():
     free = with_keys(packaged, {"rotor.torsion.free": True})
     assert find_rigid_body_mode(assemble(free)) == "the rotor is free to turn (torsion)"
     loose = with_keys(packaged, {"rotor.bearing.stiffness": 0.0})
-    assert find_rigid_body_mode(assemble(loose)) == "the rotor is free to move"
+    assert find_rigid_body_mode(assemble(loose)) == FLOATS
     unseen = rotor(np.eye(3), None, np.diag([1.0, 1.0, 0.0]), degrees=[*PLANE, (1, "u")], stators=[WALL])
     assert find_rigid_body_mode(assemble(unseen)) == ""
     adrift = MatrixStator(node=1, radius=0.1, mass=[[1.0]], stiffness=[[0.0]])
