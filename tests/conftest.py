@@ -29,6 +29,7 @@ SLOW = (
     "fem/test_campbell.py::test_critical_speed_of_another_order",
     "fem/test_campbell.py::test_critical_speeds_solve_the_synchronous_problem",
     "fem/test_critical_speeds.py",
+    "fem/test_shaft_parts.py::test_schemes_agree",
     "fem/test_linear_design.py::test_tables_set_the_range_and_the_sag",
     "fem/test_speed_dependence.py::test_a_case_is_that_of_constant_bearings[central",
     "figures/test_accessor.py::test_each_figure_is_drawn",

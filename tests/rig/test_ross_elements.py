@@ -16,6 +16,7 @@ from ross_answers import differences
 
 from rubhpc import InputError, Rig, assemble
 from rubhpc.fem.modes import modes
+from rubhpc.rig.reading import rig_from_dict
 
 STEEL = ross.Material("steel_tested", rho=7850.0, E=206e9, G_s=79e9)
 SPEEDS = (60.0, 130.0, 410.0)  # rad/s
@@ -241,3 +242,52 @@ def test_every_shaft_and_pedestal_is_held_along_its_axis():
     for build in (pedestals, coaxial):
         model = assemble(Rig.from_ross(build()))
         assert min(mode.frequency for mode in modes(model.rotor, 0.0)) > 1.0
+
+
+def test_a_rig_file_says_what_ross_does():
+    """Tapered sections, a sleeve, a bearing with a mass, pedestals, one under a table: equal eigenvalues."""
+    sections = [(0.1, 0.03, 0.04), (0.1, 0.04, 0.04), (0.2, 0.04, 0.04), (0.1, 0.04, 0.025)]
+    halves = [(0, 0.03, 0.035), (1, 0.035, 0.04), (2, 0.04, 0.04), (3, 0.04, 0.04), (4, 0.04, 0.04)]
+    halves += [(5, 0.04, 0.04), (6, 0.04, 0.0325), (7, 0.0325, 0.025)]
+    lengths = [0.05, 0.05, 0.05, 0.05, 0.1, 0.1, 0.05, 0.05]
+    inner = [
+        ross.ShaftElement(length, 0.01, left, 0.01, right, material=STEEL, n=n)
+        for (n, left, right), length in zip(halves, lengths, strict=True)
+    ]
+    around = [ross.ShaftElement(0.1, 0.04, 0.07, material=STEEL, n=n) for n in (4, 5)]
+    stands = [simple(n, kxx=6e6, kyy=9e6, cxx=500.0, cyy=300.0) for n in (9, 10)]
+    linked = [simple(0, n_link=9, mxx=0.3, myy=0.4), table(ross.BearingElement, n=8, n_link=10)]
+    masses = [ross.PointMass(n=9, m=15.0), ross.PointMass(n=10, m=9.0)]
+    theirs = ross.Rotor(
+        [*inner, *around], [ross.DiskElement(n=4, m=20.0, Id=0.15, Ip=0.28)], [*linked, *stands], masses
+    )
+    steel = {"youngs_modulus": STEEL.E, "poissons_ratio": STEEL.Poisson, "density": STEEL.rho}
+    stand = {"kyy": 9e6, "kzz": 6e6, "cyy": 300.0, "czz": 500.0}
+    turned = {"yy": ("yy", 1), "yz": ("yx", -1), "zy": ("xy", -1), "zz": ("xx", 1)}  # (y, -x) are (v, w)
+    given = {
+        f"{k}{here}": [sign * value for value in TABLE[f"{k}{there}"]]
+        for k in "kc"
+        for here, (there, sign) in turned.items()
+        if f"{k}{there}" in TABLE
+    }
+    file = {
+        "shaft": [
+            {"length": length, "elements": 2, "outer_diameter": left, "outer_diameter_right": right}
+            | {"inner_diameter": 0.01}
+            | steel
+            for length, left, right in sections
+        ],
+        "sleeve": [{"position": 0.2, "length": 0.2, "outer_diameter": 0.07, "inner_diameter": 0.04} | steel],
+        "disc": [{"position": 0.2, "mass": 20.0, "diametral_inertia": 0.15, "polar_inertia": 0.28}],
+        "bearing": [
+            {"node": 1, "kyy": 3e7, "kzz": 2e7, "cyy": 1e3, "czz": 2e3, "myy": 0.4, "mzz": 0.3}
+            | {"pedestal": {"mass": 15.0} | stand},
+            {"position": 0.5, "speed": TABLE_SPEED.tolist(), "pedestal": {"mass": 9.0} | stand} | given,
+        ],
+    }
+    ours = assemble(rig_from_dict({"name": "file", "rotor": file})).rotor
+    for speed in SPEEDS:
+        values = theirs.run_modal(speed, num_modes=2 * theirs.ndof, sparse=False).evalues
+        found = [mode.eigenvalue for mode in modes(ours, speed) if mode.kind == "lateral"]
+        for value in [value for value in found if value.imag > 0.0][:8]:
+            assert np.abs(values - value).min() < 1e-8 * abs(value)
