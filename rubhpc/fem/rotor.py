@@ -12,8 +12,8 @@ from rubhpc.fem.beam import ROTOR_DEGREES, join, rotor_elements
 from rubhpc.fem.damping import rayleigh_coefficients
 from rubhpc.fem.model import Body, SpeedDependence, Support, couple
 from rubhpc.rig.bearing_table import BearingTable
-from rubhpc.rig.parts import Bearing
 from rubhpc.rig.rotors import MatrixRotor, Rotor
+from rubhpc.rig.supports import Springs
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,12 +46,13 @@ def _(rotor: Rotor) -> Body:
     sections = [rotor_elements(*given) for given in zip(rotor.shaft, lengths, strict=True)]
     shaft = join([element for equal in sections for element in equal])
     n_shaft = len(shaft.mass)
-    n_all = n_shaft + 2 * len(rotor.pedestals)
+    stands = [node for stand in rotor.stands.values() for node, _ in stand]
+    n_all = n_shaft + 2 * len(stands)
     M, G, K, dampers = np.zeros((4, n_all, n_all))
     for matrix, own in ((M, shaft.mass), (G, shaft.gyroscopic), (K, shaft.stiffness)):
         matrix[:n_shaft, :n_shaft] = own
     degrees = [(node, name) for node in range(1, rotor.n_node + 1) for name in ROTOR_DEGREES]
-    degrees += [(node, name) for node in rotor.pedestals.values() for name in ("v", "w")]
+    degrees += [(node, name) for node in stands for name in ("v", "w")]
 
     every = [length for equal in lengths for length in equal]
     for sleeve in rotor.sleeve:
@@ -69,15 +70,15 @@ def _(rotor: Rotor) -> Body:
         G[thy, thz] += polar
         G[thz, thy] -= polar
     for number, bearing in enumerate(rotor.bearing, 1):
-        seat, stand = _rows(degrees, rotor.node_of(bearing)), _rows(degrees, rotor.stands_on(number))
-        couple(M, np.array(bearing.mass_matrix), seat, stand)
-        if isinstance(bearing, Bearing):
-            couple(K, np.array(bearing.stiffness_matrix), seat, stand)
-            couple(dampers, np.array(bearing.damping_matrix), seat, stand)
-        if bearing.pedestal is not None:
-            couple(M, np.array(bearing.pedestal.mass_matrix), stand, GROUND)
-            couple(K, np.array(bearing.pedestal.stiffness_matrix), stand, GROUND)
-            couple(dampers, np.array(bearing.pedestal.damping_matrix), stand, GROUND)
+        supports = [bearing, *(pedestal for _, pedestal in rotor.stands[number])]
+        nodes = [rotor.node_of(bearing), *(node for node, _ in rotor.stands[number])]
+        places = [*(_rows(degrees, node) for node in nodes), GROUND]
+        for support, near, far in zip(supports, places, places[1:], strict=False):
+            # the mass of a pedestal is its own, that of a bearing acts on relative motion
+            couple(M, np.array(support.mass_matrix), near, far if support is bearing else GROUND)
+            if isinstance(support, Springs):
+                couple(K, np.array(support.stiffness_matrix), near, far)
+                couple(dampers, np.array(support.damping_matrix), near, far)
     drive = rotor.torsion
     if drive.fixed_node is None:
         thx = 6 * (drive.node - 1) + 3

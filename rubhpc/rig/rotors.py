@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rubhpc.rig.places import Placed
+    from rubhpc.rig.supports import Pedestal
 
 DIVERGED_SHARE = 0.1  # of the shaft length: lateral motion that no rotor survives
 AT_A_NODE = 1e-6  # of the shaft length: a position that far from a node counts as at it
@@ -88,14 +89,22 @@ class Rotor(RotorForces):
     @property
     def positions(self) -> NDArray[np.float64]:
         """Distance of every node from the left end, those of pedestals after those of the shaft, m."""
-        stand = [self.node_of(self.bearing[number - 1]) - 1 for number in self.pedestals]
-        return np.append(self.shaft_positions, self.shaft_positions[stand])
+        under = [self.node_of(self.bearing[n - 1]) - 1 for n, stand in self.stands.items() for _ in stand]
+        return np.append(self.shaft_positions, self.shaft_positions[under])
 
     @cached_property
-    def pedestals(self) -> dict[int, int]:
-        """Nodes of the pedestals, which follow those of the shaft, by the numbers of their bearings."""
-        on_them = [i for i, bearing in enumerate(self.bearing, 1) if bearing.pedestal is not None]
-        return {number: node for node, number in enumerate(on_them, self.n_node + 1)}
+    def stands(self) -> dict[int, list[tuple[int, Pedestal]]]:
+        """Pedestals under each bearing, by its number, with their nodes, which follow those of the shaft."""
+        found: dict[int, list[tuple[int, Pedestal]]] = {}
+        node = self.n_node
+        for number, bearing in enumerate(self.bearing, 1):
+            found[number] = []
+            pedestal = bearing.pedestal
+            while pedestal is not None:
+                node += 1
+                found[number].append((node, pedestal))
+                pedestal = pedestal.pedestal
+        return found
 
     @property
     def displacement_limit(self) -> float:
@@ -104,7 +113,7 @@ class Rotor(RotorForces):
 
     def stands_on(self, number: int) -> int | None:
         """Return the node of the pedestal of a bearing, by its number; None where it stands on the ground."""
-        return self.pedestals.get(number)
+        return next((node for node, _ in self.stands[number]), None)
 
     def node_of(self, part: Placed, key: str = "") -> int:
         """Return the node of a part, found by its position where that is given."""
@@ -130,7 +139,7 @@ class Rotor(RotorForces):
 
     def check_node(self, key: str, node: int) -> None:
         """Refuse a node that neither the shaft nor a pedestal has."""
-        if node > self.n_node + len(self.pedestals):
+        if node > self.n_node + sum(map(len, self.stands.values())):
             self._check_on_shaft(key, node)
 
     def sleeve_nodes(self, sleeve: Sleeve, key: str = "") -> tuple[int, int]:

@@ -116,7 +116,11 @@ class Springs(Masses):
 
 @dataclass(frozen=True, kw_only=True)
 class Pedestal(Springs):
-    """A mass on springs on which a bearing stands."""
+    """A mass on springs on which a bearing stands, on the ground or on another one, such as a foundation."""
+
+    pedestal: Pedestal | None = table(
+        doc="What the pedestal stands on, in series; by default the ground.", default=None
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -139,7 +139,7 @@ def test_a_bearings_mass_is_that_of_a_disc_without_inertia(packaged):
 
 
 def test_a_light_pedestal_is_a_spring_in_series(packaged):
-    """K_series^-1 = K_bearing^-1 + K_pedestal^-1, of matrices; and the same with a table."""
+    """K_series^-1 = K_bearing^-1 + K_pedestal^-1, of matrices; with a table; two in series."""
     first = packaged.rotor.bearing[0]
     bearing = Bearing(node=15, kyy=2e6, kzz=3e6, kyz=4e5, kzy=-1e5)
     pedestal = Pedestal(mass=1e-7, kyy=1e6, kzz=4e6, kyz=2e5, kzy=2e5)
@@ -148,12 +148,16 @@ def test_a_light_pedestal_is_a_spring_in_series(packaged):
     direct = Bearing(node=15, **dict(zip(keys, series.ravel().tolist(), strict=True)))
     given = {key: (getattr(bearing, key),) for key in keys}
     table = BearingTable(node=15, speed=(0.0, 500.0), pedestal=pedestal, **given)
+    halves = replace(pedestal, kyy=2e6, kzz=8e6, kyz=4e5, kzy=4e5)
+    twice = replace(bearing, pedestal=replace(halves, pedestal=halves))
     expected = [
         mode.eigenvalue for mode in modes(assemble(with_parts(packaged, bearing=(first, direct))).rotor)
     ]
-    for support in (replace(bearing, pedestal=pedestal), table):
-        body = assemble(with_parts(packaged, bearing=(first, support))).rotor
-        assert body.degrees[-2:] == ((16, "v"), (16, "w"))
+    for support, last in ((replace(bearing, pedestal=pedestal), 16), (table, 16), (twice, 17)):
+        rig = with_parts(packaged, bearing=(first, support))
+        body = assemble(rig).rotor
+        assert body.degrees[-2:] == ((last, "v"), (last, "w"))
+        assert rig.rotor.positions[15:] == pytest.approx(0.8)
         found = [mode.eigenvalue for mode in modes(body)]
         assert found[:8] == pytest.approx(expected[:8], rel=1e-6)
 

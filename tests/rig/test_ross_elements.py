@@ -179,6 +179,20 @@ AT_ONE_SPEED = {
     ),
 }
 
+if AXIS == "speed":
+    AT_ONE_SPEED["BearingElement of speed and whirl"] = (
+        lambda: rotor(
+            ross.BearingElement(
+                n=4,
+                kxx=[[1e6, 2e6], [3e6, 4e6]],
+                cxx=[[1e2, 2e2], [3e2, 1e2]],
+                speed=[0.0, 500.0],
+                frequency=[0.0, 600.0],
+            )
+        ),
+        "depends on the whirl frequency",
+    )
+
 
 @pytest.fixture(autouse=True)
 def quiet():
