@@ -147,9 +147,7 @@ def _table(bearing: Any) -> BearingTable:
 
     ROSS 3 distinguishes rotor speed and whirl frequency. ROSS 2 has one axis, `frequency`, for both.
     """
-    is_ross_3 = hasattr(
-        bearing, "interpolation"
-    )  # some bearings of ROSS 2 have a `speed` too, for themselves
+    is_ross_3 = hasattr(bearing, "interpolation")  # bearings of ROSS 2 may have a `speed` for other ends
     axis = bearing.speed if is_ross_3 else bearing.frequency
     named = f"from_ross: the bearing at ROSS node {bearing.n}"
     fix = "pass the speed (rad/s) at which to evaluate all bearings"

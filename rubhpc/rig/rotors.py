@@ -149,7 +149,9 @@ class Rotor(RotorForces):
 
     def _check_sleeve(self, key: str, sleeve: Sleeve) -> None:
         """Refuse a sleeve that ends beside a node, or into which the shaft reaches."""
-        first, _ = self.sleeve_nodes(sleeve, key)
+        first, last = self.sleeve_nodes(sleeve, key)
+        if first == last:
+            raise FieldError(f"{key}.length", f"{sleeve.length:g} m reaches no other node; give a longer one")
         start, reach = self.shaft_positions[first - 1], sleeve.length
         at = 0.0
         for section in self.shaft:

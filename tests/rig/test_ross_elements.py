@@ -142,6 +142,7 @@ KINDS = {
     "ShaftElement of Euler and Bernoulli": lambda: rotor(
         shaft_elements=shaft(shear_effects=False, gyroscopic=False)
     ),
+    "ShaftElement without rotary inertia": lambda: rotor(shaft_elements=shaft(rotary_inertia=False)),
     "ShaftElement under force and torque": lambda: rotor(shaft_elements=shaft(axial_force=3e4, torque=900.0)),
     "ShaftElement with damping": lambda: rotor(shaft_elements=shaft(alpha=7.0, beta=2e-5)),
     "ShaftElement around another": sleeve,
@@ -249,6 +250,11 @@ def test_shafts_of_unlike_speeds_are_refused():
     with pytest.raises(InputError, match=r"the shafts of a MultiRotor turn at different speeds.*driving"):
         Rig.from_ross(both)
     assert Rig.from_ross(both.rotors["driving"])
+
+
+def test_an_inertia_that_is_not_symmetric_is_refused():
+    with pytest.raises(InputError, match=r"mass: is not symmetric \(5\.v with 5\.w: 1 and -1\)"):
+        Rig.from_ross(rotor(simple(4, mxy=1.0, myx=-1.0)))
 
 
 def test_every_shaft_and_pedestal_is_held_along_its_axis():

@@ -194,6 +194,7 @@ def test_a_study_sets_them(key, value, read_back):
         ),
         ('position = "0.3 m"', 'position = "0.25 m"', r"sleeve\.1\] position: no node is at 0\.25 m"),
         ('length = "0.2 m"', 'length = "0.25 m"', r"sleeve\.1\] length: no node is at 0\.55 m"),
+        ('length = "0.2 m"', 'length = "0.1 um"', r"sleeve\.1\] length: 1e-07 m reaches no other node"),
         ('mass = "0.2 kg"', 'mass = "0.2 kg"\nmyy = 0.1', r"bearing\.1\] myy: conflicts with mass"),
         ('mass = "3 kg"', "", r"bearing\.2\.pedestal\] myy: missing or 0; a pedestal has a mass"),
         ('mass = "3 kg"', "mass = 0.0", r"bearing\.2\.pedestal\] mass: missing or 0; a pedestal has a mass"),
