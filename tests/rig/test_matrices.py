@@ -21,7 +21,7 @@ from rubhpc import (
 )
 from rubhpc.fem.constraints import FLOATS, find_rigid_body_mode
 from rubhpc.fem.modes import modes
-from rubhpc.fem.response import first_lateral_frequency, steady_response
+from rubhpc.fem.response import first_lateral_frequency, steady_response, step_limit
 from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.rig.parts import Torsion
 from rubhpc.rig.reading import rig_from_dict, with_keys
@@ -289,6 +289,17 @@ def test_free_motion_is_found_where_contact_or_outputs_see_it():
         find_rigid_body_mode(assemble(rotor(stators=[WALL, replace(adrift, angle=1.0)])))
         == "stator 2 is free to move"
     )
+
+
+def test_a_rotor_that_floats_freely_is_named_and_steps_without_a_limit():
+    adrift = rotor(K=0.0 * ONE, stators=[WALL])
+    case = {"speed": 1.0, "clearance": 1e-3, "friction": 0.0, "transient": 0, "revolutions": 1}
+    with pytest.raises(
+        InputError, match=r"the rotor floats freely: .*; add a bearing with a stiffness, or set"
+    ):
+        simulate(adrift, **case)
+    assert step_limit(assemble(adrift)) == math.inf
+    assert not simulate(adrift, method="central-difference", step=1e-2, **case).vertical.any()
 
 
 def test_rotor_free_in_torsion_is_refused_with_the_fix_and_a_soft_drive_twists_alike():
