@@ -77,7 +77,7 @@ def _walk(owner: type, above: str, found: dict[type, list[str]]) -> None:
             path = f"{above}{field.name}"
             head = f"[[{path}]]" if typing.get_origin(hints[field.name]) is tuple else f"[{path}]"
             if kind not in found:
-                found[kind] = []
+                found[kind] = [head]
                 _walk(kind, f"{path}.", found)
             if head not in found[kind]:
                 found[kind].append(head)

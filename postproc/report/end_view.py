@@ -40,7 +40,7 @@ def end_view(rig: Rig) -> str:
         line(frame.x0, frame.y(-rim) + 10, frame.x0, frame.y(rim) - 10, "axis"),
     ]
     if isinstance(rig.rotor, Rotor):
-        shaft = max(scale * max(s.outer_diameter for s in rig.rotor.shaft) / 2, 2)
+        shaft = max(scale * max(max(s.diameters[0]) for s in rig.rotor.shaft) / 2, 2)
         parts.append(f'<circle class="shaft" cx="{frame.x0:.1f}" cy="{frame.y0:.1f}" r="{shaft:.1f}"/>')
     for carrier in rig.carrier:
         carried = [

@@ -157,8 +157,7 @@ def _positions(rig: Rig, model: Model) -> xr.Dataset:
     nodes = response_nodes(model)
     positions = np.full(len(nodes), np.nan)
     if isinstance(rig.rotor, Rotor):
-        lengths = [s.length / s.elements for s in rig.rotor.shaft for _ in range(s.elements)]
-        positions = np.concatenate([[0.0], np.cumsum(lengths)])[np.array(nodes) - 1]
+        positions = rig.rotor.positions[np.array(nodes) - 1]
     place = ("node", positions, _unit("m", "Position along the shaft"))
     return xr.Dataset(coords={"node": nodes, "position": place})
 

@@ -148,7 +148,8 @@ def _kind_of(hint: Any, table: object) -> Any:
         required = {key_of(f) for f in declared if f.default is dataclasses.MISSING}
         return len(keys & {key_of(f) for f in declared}), -len(required - keys)
 
-    return max(get_args(hint) or (hint,), key=likeness)
+    kinds = [kind for kind in get_args(hint) or (hint,) if kind is not type(None)]  # None: it may be left out
+    return max(kinds, key=likeness)
 
 
 def _missing(declared: dataclasses.Field[Any], hint: Any, name: str) -> str:

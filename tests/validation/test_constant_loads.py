@@ -294,7 +294,7 @@ def test_matrices_take_gravity_and_loads_like_the_beam():
 
 def test_what_nothing_holds_is_refused():
     wall = LumpedStator(node=1, rigid=True, radius=1.0)
-    with pytest.raises(InputError, match="is unconstrained there; add a bearing"):
+    with pytest.raises(InputError, match="floats freely: its bearings do not hold it; add a bearing"):
         assemble(Rig.from_matrices([[1.0]], K=[[0.0]], degrees=[(1, "v")], stators=wall, gravity=G))
     with pytest.raises(InputError, match=r"gravity: cannot be applied to the coordinates q\.\.\."):
         Rig.from_matrices(np.eye(2), K=np.eye(2), degrees=[(1, "v"), (1, "q1")], stators=wall, gravity=G)

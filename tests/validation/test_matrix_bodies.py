@@ -207,7 +207,7 @@ class RossRotor:
     and `BearingElement(kxx=1e6, cxx=0)` at nodes 0 and 14, of steel with E = 210 GPa and G = 79.6 GPa.
     """
 
-    number_dof, L, bearing_elements = 6, 0.8, ()
+    number_dof, L, bearing_elements, nodes = 6, 0.8, (), range(15)
 
     def __init__(self, folder):
         self._entries = np.load(folder / "ross_2.3.0_mokhtar2017.npz")
