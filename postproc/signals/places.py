@@ -23,11 +23,12 @@ _LEAST_SINE = 0.05  # of the angle between two probes: 3 degrees
 
 
 def named_places(store: xr.Dataset) -> xr.Dataset:
-    """Return the store with the attribute `place` of its signals, which captions show."""
-    if not isinstance(store.attrs.get("rig"), dict):
+    """Return the store with the attribute `place` of its signals, for captions; as it is without a rig."""
+    try:
+        disc, nodes = recorded_node(store), {stator.node for stator in rig_of(store).stator}
+    except InputError:  # none, or one of another version
         return store
-    probes, disc, nodes = probes_of(store), recorded_node(store), {s.node for s in rig_of(store).stator}
-    found = {}
+    probes, found = probes_of(store), {}
     for name, values in store.data_vars.items():
         signal = str(name)
         for prefix in _PREFIXES:

@@ -8,7 +8,7 @@ import pytest
 import rubhpc
 from postproc.figures.orbit import orbit
 from postproc.report.page import Page
-from postproc.signals.places import moved_at
+from postproc.signals.places import moved_at, named_places
 from postproc.signals.spectra import spectrum_data
 from postproc.signals.waveforms import orbit_data, waveform_data
 from rubhpc.errors import InputError
@@ -75,6 +75,16 @@ def test_two_probes_give_the_orbit_whatever_their_angles(cases):
     axes = orbit(one, probes=("left", "aside")).show(None)
     assert axes.get_xlabel().startswith("Horizontal displacement (")
     assert "motion at node 8" in axes.figure.get_suptitle()
+
+
+def test_captions_name_the_places_of_signals(cases):
+    named = named_places(cases)
+    assert named["torsion"].attrs["place"] == "motion at node 8"
+    assert named["spectrum_probe_left"].attrs["place"] == "left: node 8 at -45\N{DEGREE SIGN}"
+    strange = cases.assign_attrs(rig={"rotor": "of another version"})
+    assert named_places(strange) is strange
+    with pytest.raises(InputError, match='run the study with "waveform"'):
+        moved_at(cases.drop_vars("probe_left"), ("left", "aside"))
 
 
 def test_a_place_is_chosen_by_its_node_or_stator(cases):
