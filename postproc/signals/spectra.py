@@ -65,7 +65,7 @@ def full_spectrum(vertical: xr.DataArray, horizontal: xr.DataArray) -> xr.DataAr
     orders = np.fft.fftshift(np.fft.fftfreq(n, d=1 / samples_per_revolution(vertical)))
     spectrum = _over_orders(_two_sided, orders, vertical, horizontal)
     spectrum.name = WHIRL
-    spectrum.attrs = {"units": vertical.attrs.get("units", "m"), "long_name": "whirl amplitude"}
+    spectrum.attrs = {**vertical.attrs, "long_name": "whirl amplitude"}
     return spectrum
 
 
@@ -163,21 +163,6 @@ def with_frequency(spectrum: xr.DataArray, spin_speed: xr.DataArray) -> xr.DataA
     frequency = (rate * spectrum["order"]).assign_attrs(units="Hz", long_name="frequency")
     dims = [d for d in spectrum.dims if d in frequency.dims]
     return spectrum.assign_coords(frequency=frequency.transpose(*dims))
-
-
-def signal_or_whirl(signal: str, full: bool) -> str:
-    """Return the name of what is drawn: the whirl for a full spectrum, which has no other signal.
-
-    Raises
-    ------
-    InputError
-        A full spectrum, and a signal other than torsion, the default of the figures.
-    """
-    if full and signal not in ("torsion", WHIRL):
-        raise InputError(
-            f"--full is of the orbit and conflicts with --signal {signal}; leave out one of them"
-        )
-    return WHIRL if full else signal
 
 
 def check_signal(signal: str, store: xr.Dataset | None = None) -> None:

@@ -59,12 +59,11 @@ def natural_frequencies(case: xr.Dataset, along: str | None = None) -> dict[str,
     return _over_rig(case, along, lambda rig: _first_of_kinds(modes(assemble(rig).rotor), ROTOR_MODES))
 
 
-def frequencies_at_speed(case: xr.Dataset) -> dict[str, list[float]]:
-    """Return the natural frequencies (Hz) of the rotor at the speed of one case, without contact, by kind."""
+def frequencies_at_speed(case: xr.Dataset, spin: float) -> dict[str, list[float]]:
+    """Return the natural frequencies (Hz) of the rotor of a case without contact at a speed (rad/s), by kind."""
     from rubhpc.fem.assemble import assemble
     from rubhpc.fem.modes import modes
 
-    spin = float(case["spin_speed"])
     found: dict[str, list[float]] = {}
     for mode in modes(assemble(rig_of(case)).rotor, spin):
         if mode.frequency > 0.0:
@@ -112,15 +111,27 @@ def _over_rig(
     }
 
 
-def stator_places(case: xr.Dataset) -> list[tuple[float, float]]:
-    """Return angle (rad, from straight up with the spin) and clearance offset (m) of the stators at the disc.
+def recorded_node(case: xr.Dataset) -> int:
+    """Return the node whose motion is recorded: that of the first stator, unless the rotor names another."""
+    rig = rig_of(case)
+    return rig.rotor.recorded_node([stator.node for stator in rig.stator])
 
-    The disc is the one whose motion is recorded, at the node of the first stator; others touch another disc.
+
+def stators_around(case: xr.Dataset) -> list[int]:
+    """Return which stators, from 0, stand around the node whose motion is drawn; others touch another disc.
+
+    It is the recorded one, unless the attribute `node` of the case names another.
     """
     if "rig" not in case.attrs:
         return []
-    stators = rig_of(case).stator
-    return [(s.angle, s.clearance_offset) for s in stators if s.node == stators[0].node]
+    node = case.attrs["node"] if "node" in case.attrs else recorded_node(case)
+    return [i for i, stator in enumerate(rig_of(case).stator) if stator.node == node]
+
+
+def stator_places(case: xr.Dataset) -> list[tuple[float, float]]:
+    """Return angle (rad, from straight up with the spin) and clearance offset (m) of the stators around."""
+    around = stators_around(case)
+    return [(s.angle, s.clearance_offset) for s in (rig_of(case).stator[i] for i in around)]
 
 
 def has_beams(case: xr.Dataset) -> bool:
@@ -131,11 +142,8 @@ def has_beams(case: xr.Dataset) -> bool:
 
 
 def is_carried(case: xr.Dataset) -> bool:
-    """Whether stators at the disc stand on a carrier, with which they move."""
-    if "rig" not in case.attrs:
-        return False
-    stators = rig_of(case).stator
-    return any(s.carrier is not None for s in stators if s.node == stators[0].node)
+    """Whether stators around the node whose motion is drawn stand on a carrier, with which they move."""
+    return any(rig_of(case).stator[i].carrier is not None for i in stators_around(case))
 
 
 def rig_axes(case: xr.Dataset) -> dict[str, str]:

@@ -34,7 +34,8 @@ def require_variables(store: xr.Dataset, names: Iterable[str]) -> None:
     for name in names:
         if name in store:
             continue
-        role = role_of(name) if name in VARIABLES else ""  # no probe needs to be there
+        is_recorded = name in VARIABLES or name.removeprefix(PROBE) in probes_of(store)
+        role = role_of(name) if is_recorded else ""
         if role in LONG_ROLES:
             fix = f'run the study with "{role}" in [record] keep'
             raise InputError(f"{source(store)}: does not contain {name}; {fix}")

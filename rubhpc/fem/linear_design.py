@@ -79,6 +79,9 @@ def linear_design(
 
         `threshold_speed` (rad/s): where the rotor begins to be unstable; NaN where it is stable.
 
+        Attributes: `rig`, its name; `speed_range` and, where given, `operating` (rad/s); `bearing_nodes`, the
+        nodes with bearings or seals.
+
     Raises
     ------
     InputError
@@ -109,7 +112,8 @@ def linear_design(
     )
     threshold = threshold_speed(model.rotor, speeds, tracks)
     design["threshold_speed"] = ((), threshold, _unit("rad s-1", "Threshold speed of instability"))
-    design.attrs = {"rig": rig.name, "speed_range": [low, high]}
+    bearings = sorted({rig.rotor.node_of(bearing) for bearing in rig.rotor.bearing})
+    design.attrs = {"rig": rig.name, "speed_range": [low, high], "bearing_nodes": bearings}
     if operating is not None:
         design.attrs["operating"] = list(operating)
     return design

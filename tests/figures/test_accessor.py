@@ -89,7 +89,7 @@ def test_every_figure_is_a_method_with_its_signature_and_docstring(store: xr.Dat
 def test_a_figure_has_its_options_by_name_in_help() -> None:
     text = " ".join(pydoc.render_doc(Rub.spectrum, renderer=pydoc.plaintext).split())
     text = text.replace("( ", "(")  # from Python 3.13 on a long signature has a line for each parameter
-    assert "spectrum(self, /, signal: str = 'torsion', *, full: bool = False, orders: bool" in text
+    assert "spectrum(self, /, signal: str | None = None, *, full: bool = False, probes: tuple[" in text
     assert "lines: int = 6, log: bool = False" in text
 
 
@@ -112,7 +112,7 @@ def test_as_many_axes_are_asked_for_as_a_figure_has(store: xr.Dataset) -> None:
     ("name", "args", "message"),
     [
         ("cascade", {"form": "water"}, 'form: "water" is not one of waterfall, intensity'),
-        ("cascade", {"max_frequency": -5.0, **REST}, "out of range"),
+        ("cascade", {"max": -5.0, **REST}, "out of range"),
         ("bifurcation", {"color": "red"}, 'color: "red" is not one of regime, period'),
         ("hht", {"contact": "none", **ONE}, "contact: "),
         ("orbit", {"revolutions": 0, **ONE}, "revolutions: 0 is out of range; it must be at least 1"),
