@@ -60,7 +60,7 @@ def natural_frequencies(case: xr.Dataset, along: str | None = None) -> dict[str,
 
 
 def frequencies_at_speed(case: xr.Dataset, spin: float) -> dict[str, list[float]]:
-    """Return the natural frequencies (Hz) of the rotor of a case without contact at a speed (rad/s), by kind."""
+    """Return the natural frequencies (Hz) of the rotor of a case at a speed (rad/s), by kind."""
     from rubhpc.fem.assemble import assemble
     from rubhpc.fem.modes import modes
 
