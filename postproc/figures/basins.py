@@ -92,7 +92,9 @@ def basins(
         shown["basin_entropy"], shown["boundary_basin_entropy"] = entropy, boundary
         near = f"{boundary:.3g} (fractal above 0.693)"
         if not np.isfinite(boundary):
-            near = f"none: {'no box has two motions' if shown['attractor'].size > 1 else 'there is one motion'}"
+            near = (
+                f"none: {'no box has two motions' if shown['attractor'].size > 1 else 'there is one motion'}"
+            )
         if np.isfinite(entropy):  # NaN of a grid that is smaller than a box
             notes.append(f"basin entropy {entropy:.3g}, on the boundaries {near}")
     is_one_setting = shown["fraction"].dims == ("attractor",)
