@@ -81,9 +81,10 @@ def basin_entropy(attractor: xr.DataArray, x: str, y: str) -> tuple[float, float
     """Return basin entropy and boundary basin entropy of starts on a grid, nat.
 
     The mean Gibbs entropy of the motions in boxes of `ENTROPY_BOX` by `ENTROPY_BOX` neighbouring starts, over
-    boxes at all places of the grid, and over those of more than one motion: above ln 2 the boundary is fractal
-    (Daza and others, Sci. Rep. 6, 31416, 2016). Starts without a motion are left out of their boxes. NaN where
-    the grid is smaller than a box or no start has a motion, and of the boundary where no box has two motions.
+    boxes at all places of the grid, and over those of more than one motion. Above ln 2 the boundary is
+    fractal (Daza and others, Sci. Rep. 6, 31416, 2016). Starts without a motion are left out of their boxes.
+    NaN where the grid is smaller than a box or no start has a motion, and on the boundaries where no box has
+    two motions.
     """
     grid = attractor.transpose(y, x).sortby([y, x]).values
     if min(grid.shape) < ENTROPY_BOX:

@@ -29,9 +29,10 @@ MOST_DISTANT = 0.1  # of the orbit's size: a record farther from a motion does n
 LEAST_REVOLUTIONS = LONGEST_PERIOD  # of a record without a period that is followed further
 TORUS_REVOLUTIONS = 2 * LONGEST_PERIOD  # of a record that may show a torus, or a longer period, by itself
 LASTING_REVOLUTIONS = 1536  # of a record that may show by itself that chaos lasts
-N_FIRST, N_ALL, N_MOST = 16, 64, 256  # spans of measured growth, each if the one before was not conclusive
-CLEAR = 0.05  # per revolution: sign of a larger exponent over 16 spans is certain
+N_FIRST, N_ALL, N_MOST = 12, 64, 256  # spans of measured growth, each if the one before was not conclusive
+CLEAR = 0.05  # per revolution: sign of a larger exponent over 12 spans is certain
 ZERO = 0.01  # per revolution: a smaller exponent counts as zero
+LASTING = 0.04  # per revolution: least mean of the exponents of chaos and of what it is later
 REAL = 1e-6  # imaginary part below which a multiplier counts as real
 SURE = 2.0  # standard errors: an exponent within them counts as zero
 
@@ -69,7 +70,7 @@ def regime(
     solve: Solve | None = None,
     within: Within | None = None,
     later: Later | None = None,
-    lasts: Callable[[], bool] | None = None,
+    lasts: Callable[[float], bool] | None = None,
     n_event: float = 0.0,
 ) -> Verdict:
     """Judge a record.
@@ -101,7 +102,7 @@ def regime(
         Searches in later revolutions, in order, where the record looks periodic or does not, and where it
         looks chaotic or does not (`proof.Solver.later`).
     lasts : callable, optional
-        Whether chaos goes on in them, after these searches.
+        Whether chaos of an exponent goes on in them, after these searches.
     n_event : float
         Events in a revolution, where they are known.
     """
@@ -141,7 +142,7 @@ def regime(
         if verdict is not None:
             return verdict._replace(exponent=exponent)
     is_settling = solve is None and flag == periodic and period > 0
-    is_passing = is_chaotic and not (lasts() if lasts else orbit.n_revolution >= LASTING_REVOLUTIONS)
+    is_passing = is_chaotic and not (lasts(exponent) if lasts else orbit.n_revolution >= LASTING_REVOLUTIONS)
     return Verdict(flag, period if is_settling else 0, exponent, is_reached=not (is_settling or is_passing))
 
 
@@ -253,6 +254,13 @@ def by_growth(
         if abs(np.mean(later)) <= ZERO:
             return REGIME.index("quasi_periodic"), float(np.mean(later))
     return REGIME.index("periodic"), exponent
+
+
+def lasts_by_growth(growth: Iterable[float], exponent: float) -> bool:
+    """Whether chaos of an exponent is chaos later, by the growth there."""
+    grown = list(islice(growth, N_FIRST))
+    mean = float(np.mean(grown)) if len(grown) == N_FIRST else -math.inf
+    return mean > 0.0 and mean + exponent >= 2.0 * LASTING
 
 
 def standard_error(grown: list[float]) -> float:
