@@ -10,14 +10,14 @@ from rubhpc.integrate.lyapunov import Growth, Marches
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.measuring.orbit_measures import period
-from rubhpc.integrate.measuring.regimes import LEAST_REVOLUTIONS, lasts_by_growth, regime
+from rubhpc.integrate.measuring.regimes import LASTING, LEAST_REVOLUTIONS, by_growth, regime
 from rubhpc.integrate.measuring.settling import is_steady
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.periodic_motions.lyapunov_spectrum import spectrum_of
 from rubhpc.integrate.periodic_motions.proof import Solver
 from rubhpc.integrate.tangent_motion import TangentMotion
 from rubhpc.kernels.trail import BROKEN
-from rubhpc.schema import lyapunov_variables
+from rubhpc.schema import REGIME, lyapunov_variables
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -75,10 +75,10 @@ def judge_of(
         if trail is not None:
             trail.n_event[0] = BROKEN  # its room alone is used again
         try:
-            there = Growth(lambda: neighbours_of(march, trail, start, end, setup, recording))
-            return lasts_by_growth(there, exponent)
+            flag, later = by_growth(Growth(lambda: neighbours_of(march, trail, start, end, setup, recording)))
         except NoClosedForm:
             return False
+        return flag == REGIME.index("chaotic") and exponent + later >= 2.0 * LASTING
 
     def judge(vertical: Floats, horizontal: Floats, per_revolution: int, is_contact: bool) -> Verdict:
         return regime(

@@ -256,13 +256,6 @@ def by_growth(
     return REGIME.index("periodic"), exponent
 
 
-def lasts_by_growth(growth: Iterable[float], exponent: float) -> bool:
-    """Whether chaos of an exponent is chaos later, by the growth there."""
-    grown = list(islice(growth, N_FIRST))
-    mean = float(np.mean(grown)) if len(grown) == N_FIRST else -math.inf
-    return mean > 0.0 and mean + exponent >= 2.0 * LASTING
-
-
 def standard_error(grown: list[float]) -> float:
     """Standard error of the mean of independent growths."""
     return float(np.std(grown)) / math.sqrt(len(grown))
