@@ -32,7 +32,7 @@ LASTING_REVOLUTIONS = 1536  # of a record that may show by itself that chaos las
 N_FIRST, N_ALL, N_MOST = 12, 64, 256  # spans of measured growth, each if the one before was not conclusive
 CLEAR = 0.05  # per revolution: sign of a larger exponent over 12 spans is certain
 ZERO = 0.01  # per revolution: a smaller exponent counts as zero
-LASTING = 0.04  # per revolution: least mean of the exponents of chaos and of what it is later
+LASTING = 0.03  # per revolution: least mean of the exponents of chaos and of what it is later
 REAL = 1e-6  # imaginary part below which a multiplier counts as real
 SURE = 2.0  # standard errors: an exponent within them counts as zero
 

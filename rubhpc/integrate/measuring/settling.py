@@ -23,7 +23,7 @@ UNKNOWN = -1  # the record is too short
 MOST_SHIFT, MOST_RATIO = 2.0, 2.0
 MOST_CHANGE = PERIOD_TOLERANCE  # of the orbit's size, or of the impulse: less is no change
 # Of a longer motion: revolutions of which the mean is taken, and standard errors by which the means of the
-# halves may differ. They differ by more in 5 of 100 lasting chaotic motions, and in half of those that end.
+# halves may differ. They differ by more in 6 of 100 lasting chaotic motions, and in half of those that end.
 BLOCK, MOST_ERRORS = 32, 5.0
 
 

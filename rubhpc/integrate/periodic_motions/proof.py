@@ -82,11 +82,10 @@ class Solver:
 
         A case that looks periodic goes on for 512 revolutions, as does one of one or two pairs. Else one of
         three to five pairs goes on for 128 and one of more not at all, for the time that it takes. A case
-        that looks chaotic goes on for longer: 1536, 512 or 128. Where its
-        last revolutions return within 1e-4 of the motion's size, and in half the distance of the search
-        before, it may have come to a periodic motion; at the end also where they return within 1 %, nearer
-        than ever and in half the distance of the beginning. `followed` is what it has come to if it has
-        reached the end.
+        that looks chaotic goes on for longer: 1536, 512 or 128 revolutions. Where its last revolutions return
+        within 1e-4 of the motion's size, and in half the distance of the search before, it may have come to a
+        periodic motion; at the end also where they return within 1 %, nearer than ever and in half the
+        distance of the beginning. A case that reaches the end is in `followed`.
         """
         setup, clearance, friction, state = self._case
         n_on, tried = 0, ARRIVED / NEARER
