@@ -61,12 +61,15 @@ def read_state(path: str, select: Selection) -> StoredState:
     """
     import zarr
 
+    from rubhpc.input.array_files import CHECKED, ArrayFiles
+
     where = f"[initial] from: {path}"
     if not Path(path).exists():
         problem = f'{brief(path)} is not available; choose one of "rest", "contact_free"'
         raise InputError(f"[initial] from: {problem}, or the path of a store")
     try:
-        group = zarr.open_group(path, mode="r")
+        with zarr.config.set(CHECKED):
+            group = zarr.open_group(ArrayFiles(path), mode="r", zarr_format=3)
         rig: Any = group.attrs["rig"]
     except (OSError, KeyError, ValueError, TypeError):
         raise InputError(f"{where}: is not a store of a study; give the path of one") from None
