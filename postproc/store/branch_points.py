@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
+from postproc.store.attributes import table_of
 from postproc.store.axes import source
 from rubhpc.errors import InputError
 from rubhpc.schema import BRANCH_EVENT, POINT
@@ -20,7 +21,7 @@ def is_of_points(store: xr.Dataset) -> bool:
 
 def followed(store: xr.Dataset) -> str:
     """Return the coordinate along which branches were followed."""
-    return str(store.attrs["study"]["branch"]["along"]).replace(".", "_")
+    return str(table_of(store, "study")["branch"]["along"]).replace(".", "_")
 
 
 def other_axes(points: xr.Dataset) -> list[str]:

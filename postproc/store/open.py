@@ -61,7 +61,9 @@ def open_store(path: str | Path) -> xr.Dataset:
     if is_damaged(path):
         raise StoreError(f"{path}: its metadata are damaged; run its study again to repair them")
     if store["status"].size > MOST_CASES:
-        raise StoreError(f"{path}: states {store['status'].size} cases, more than a store can have; get it anew")
+        raise StoreError(
+            f"{path}: states {store['status'].size} cases, more than a store can have; get it anew"
+        )
     store = with_sound_attributes(store, path)
     if f"{POINT}value" in store:
         return as_points(store)
