@@ -131,7 +131,7 @@ def _check_root(attributes: dict[str, Any]) -> None:
         if not isinstance(text, str):
             raise TypeError("a name or a version is no text")
     for name, about in study.get("grid", {}).items():
-        values = about.get("values", [about.get("start"), about.get("stop")])
+        values = about.get("values", [about.get("start", 0), about.get("stop", 0)])
         if not isinstance(about.get("unit", ""), str) or not isinstance(about.get("scale", ""), str):
             raise TypeError(f"unit of {name} is no text")
         if not isinstance(values, list) or not all(isinstance(v, str) or type(v) in _NUMBERS for v in values):
