@@ -89,7 +89,7 @@ class Holder:
 
 @cache
 def process_space() -> str:
-    """Identifies the numbers of processes that this one sees: of a container, of a machine since it booted."""
+    """Identify the numbers of processes that this one sees: of a container, of a machine since boot."""
     try:
         boot = Path("/proc/sys/kernel/random/boot_id").read_text()
         return f"{crc32((boot + os.readlink('/proc/self/ns/pid')).encode()):08x}"

@@ -6,6 +6,7 @@ from abc import abstractmethod
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -37,7 +38,8 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-_BEGUN = bare(new_progress(1))
+# Kernels that are not compiled read fields as attributes, which a plain structured array has none of.
+_BEGUN = new_progress(1) if numba.config.DISABLE_JIT else bare(new_progress(1))
 
 
 class Place(NamedTuple):
