@@ -71,7 +71,8 @@ class Store:
             remove_drafts(place)
             draft.mkdir()
             try:
-                layout.build(draft, grid)
+                with disk_errors(path):  # while all of it is there, a disk that is full shows of what
+                    layout.build(draft, grid)
                 draft.rename(place)
             except (FileExistsError, NotADirectoryError):
                 raise StoreError(no_store(path, ELSEWHERE)) from None
