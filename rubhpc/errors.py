@@ -17,7 +17,7 @@ _NO_INODES = "no inodes are left for another file (df -i); remove some files"
 
 
 def reason_of(error: OSError, path: Path) -> str:
-    """Return why the file or directory at `path` cannot be written, with the cure of what is hard to guess."""
+    """Return why the file or directory at `path` cannot be written, with a cure where it is hard to guess."""
     if "unable to lock file" in str(error):
         return _LOCKED
     return _NO_INODES if lacks_inodes(error, path) else error.strerror or str(error)
