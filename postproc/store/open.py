@@ -17,7 +17,7 @@ from rubhpc.input.array_files import CHECKED
 from rubhpc.schema import POINT, TURNED, VARIABLES, role_of
 from rubhpc.storage.regular_files import RegularFiles
 from rubhpc.storage.store import is_damaged
-from rubhpc.study.cases import MOST_CASES
+from rubhpc.study.points import MOST_CASES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -63,7 +63,7 @@ def read_metadata(path: Path, root: Path) -> tuple[bytes, dict[str, int]]:
             for member, about in members.items()
             if about["node_type"] != "group"
         }
-    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+    except (ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
         reason = printable(str(error))[:120]
         raise StoreError(f"{path}: is not the metadata of a store ({reason}); get the store anew") from None
     return data, most

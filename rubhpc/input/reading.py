@@ -171,7 +171,7 @@ def _parse_toml(content: bytes, file: str) -> dict[str, Any]:
     bare = _QUOTED.sub("q", text)
     if deep := _DEEP.search(bare):
         line = bare.count("\n", 0, deep.start()) + 1
-        raise InputError(f"{file}: line {line}: a key of over {_DEEPEST} parts; correct it")
+        raise InputError(f"{file}: line {line}: a key of over {_DEEPEST} parts; no key has so many")
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
