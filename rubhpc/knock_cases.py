@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.errors import InputError
+from rubhpc.errors import InputError, reason_of
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import check_response_node, first_lateral_frequency
 from rubhpc.integrate.case import compile_kernels, run_case
@@ -143,7 +143,7 @@ class Progress:
                 file.write(f"\n{json.dumps({'key': key} | asdict(found))}\n")
         except OSError as error:
             raise InputError(
-                f"{self._path}: cannot be written ({error.strerror}); choose another place"
+                f"{self._path}: cannot be written ({reason_of(error, self._path)}); choose another place"
             ) from None
 
 

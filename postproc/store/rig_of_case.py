@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import xarray as xr
 
+from postproc.store.attributes import table_of
 from postproc.store.axes import source
 from rubhpc.errors import InputError
 from rubhpc.rig.reading import rig_from_dict, with_keys
@@ -34,8 +35,8 @@ def rig_of(case: xr.Dataset, values: Mapping[str, float] | None = None) -> Rig:
     InputError
         The store contains no rig, or one that this version cannot read.
     """
-    table = case.attrs.get("rig")
-    if not isinstance(table, dict):
+    table = table_of(case, "rig")
+    if not table:
         raise InputError(f"{source(case)}: contains no rig; give a store that rubhpc has written")
     rig = rig_from_dict(table, f"{source(case)}: rig")
     chosen = {
@@ -136,7 +137,7 @@ def stator_places(case: xr.Dataset) -> list[tuple[float, float]]:
 
 def has_beams(case: xr.Dataset) -> bool:
     """Whether a stator is a beam, with a length and an Euler load; true where no rig says otherwise."""
-    if not isinstance(case.attrs.get("rig"), dict):
+    if not table_of(case, "rig"):
         return True
     return any(isinstance(stator, Stator) for stator in rig_of(case).stator)
 
@@ -148,6 +149,5 @@ def is_carried(case: xr.Dataset) -> bool:
 
 def rig_axes(case: xr.Dataset) -> dict[str, str]:
     """Return the axes of the study that are keys of the rig: coordinate to dotted key."""
-    study: dict[str, Any] = case.attrs.get("study", {})
-    keys = (name for name in study.get("grid", {}) if "." in name and not is_of_table(name))
+    keys = (name for name in table_of(case, "study").get("grid", {}) if "." in name and not is_of_table(name))
     return {coordinate_of(key): key for key in keys}

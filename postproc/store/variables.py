@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from postproc.store.attributes import table_of
 from postproc.store.axes import source
 from rubhpc.errors import InputError
 from rubhpc.schema import PROBE, VARIABLES, role_of
@@ -62,8 +63,7 @@ def require_results(values: ArrayLike, store: xr.Dataset) -> None:
 
 def probes_of(store: xr.Dataset) -> dict[str, dict[str, Any]]:
     """Return the probes of a store by name, each with the keys of its table of the study, in SI."""
-    study = store.attrs.get("study")
-    record = study.get("record", {}) if isinstance(study, dict) else {}
+    record = table_of(store, "study").get("record", {})
     return {probe["name"]: probe for probe in record.get("probe", [])}
 
 

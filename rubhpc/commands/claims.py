@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from rubhpc.errors import InputError
+from rubhpc.errors import InputError, reason_of
 
 FOLDER = "paper"  # where the studies of jobs/paper put their stores
 
@@ -54,4 +54,6 @@ def _write(path: Path, content: str) -> None:
     try:
         path.write_text(content, encoding="utf-8")
     except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}; choose another --document") from error
+        raise InputError(
+            f"{path}: cannot be written: {reason_of(error, path)}; choose another --document"
+        ) from error

@@ -46,6 +46,9 @@ def differences(stored: Manifest, asked: Manifest) -> list[str]:
             n_mine, n_yours = (dict(zip(m.dims, m.shape, strict=True))[dim] for m in (stored, asked))
             why = "n can only grow" if n_yours < n_mine else "this SALib or SciPy draws other points"
             found.append(f"the sample lacks {len(lost)} of its {n_mine} cases ({why})")
+    room, needed = (manifest.sizes.get("revolution", 0) for manifest in (stored, asked))
+    if not found and room != needed:
+        found.append(f"run_up.time: its arrays have room for {room} revolutions, and a case needs {needed}")
     is_same = (stored.identity, stored.keep, stored.sizes) == (asked.identity, asked.keep, asked.sizes)
     if not found and not is_same:
         found.append("its identity")

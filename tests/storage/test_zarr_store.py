@@ -278,6 +278,15 @@ def test_the_draft_of_a_killed_creation_is_removed(study):
     assert not draft.exists()
 
 
+def test_the_draft_of_another_container_is_left(study):
+    import socket
+
+    draft = study.output.with_name(f".tiny.zarr.{socket.gethostname()}.elsewhere.{2**22 + 1}.draft")
+    draft.mkdir()
+    open_store(CaseGrid(study))
+    assert draft.exists()
+
+
 def test_a_draft_is_removed_by_the_next_run_though_the_store_is_there(study, store):
     """Its process may be a zombie, or its number in use again, when the store is made by another."""
     import os
