@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 STYLES: dict[str, dict[str, Any]] = {
     "forward": {"color": "C1", "linestyle": "-"},
     "backward": {"color": "C0", "linestyle": (0, (4, 4)), "zorder": 2.5},  # a forward mode shows between
+    "mixed": {"color": "C4", "linestyle": (0, (6, 1.5))},
     "planar": {"color": "0.3", "linestyle": "-"},
     "torsional": {"color": "C2", "linestyle": (0, (4, 1.2, 1, 1.2))},
     "axial": {"color": "C3", "linestyle": (0, (1, 1.2))},

@@ -14,7 +14,7 @@ from scipy.linalg import eig
 from rubhpc.errors import InputError
 from rubhpc.fem.computable import FAR_APART
 from rubhpc.fem.undamped import EPS, undamped_modes
-from rubhpc.fem.whirl import planar_twins, whirl_index, whirl_word
+from rubhpc.fem.whirl import planar_twins, whirl_word
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -55,9 +55,9 @@ class Mode:
         "lateral", "torsional" or "axial"; if matrices couple them, the one with most of the kinetic energy,
         which is "other" for user-defined coordinates.
     whirl : str
-        "forward" (in the sense of the spin), "backward", or "planar" if neither dominates, as in the two
-        equal modes of an isotropic rotor at standstill. "none" for other kinds, for stators, and if some node
-        moves in one plane only.
+        "forward" (in the sense of the spin), "backward", "mixed" if some nodes whirl forward and others
+        backward, or "planar" if neither dominates, as in the two equal modes of an isotropic rotor at
+        standstill. "none" for other kinds, for stators, and if some node moves in one plane only.
     eigenvalue : complex
         rad/s, with an imaginary part of at least 0; of two real eigenvalues the one that decays more slowly.
     shape : (n_dof,) complex
@@ -230,7 +230,7 @@ def _whirls(
     """Return modes and their sense of whirl; two with one eigenvalue are replaced by planar ones."""
     pairs = sorted(pairs, key=lambda pair: pair[0].imag)
     tolerance = 100 * EPS * max(abs(first) for first, _, _ in pairs)
-    words = [whirl_word(whirl_index(shape, mass, names), spin) for _, _, shape in pairs]
+    words = [whirl_word(shape, mass, names, spin) for _, _, shape in pairs]
     for i, ((one, _, shape), (other, _, twin)) in enumerate(pairwise(pairs)):
         if one.imag > 0.0 and abs(one - other) < tolerance + 1e-9 * abs(one):
             vertical, horizontal = planar_twins(shape, twin, names)

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 # A mode of index 1e-3 moves on ellipses 2000 times as long as wide.
 PLANAR = 1e-3
+AT_REST = 0.01  # of the largest amplitude of a mode: less is a node of it
 
 
 def whirl_index(shape: Vector, mass: NDArray[np.float64], names: Sequence[str]) -> float:
@@ -52,8 +53,17 @@ def planar_twins(first: Vector, second: Vector, names: Sequence[str]) -> tuple[V
     return span @ least_horizontal, span @ least_vertical
 
 
-def whirl_word(index: float, spin: float) -> str:
-    """Return "forward" for a whirl in the sense of the spin (at standstill: of positive spin)."""
+def whirl_word(shape: Vector, mass: NDArray[np.float64], names: Sequence[str], spin: float) -> str:
+    """Return "forward" for a whirl in the sense of the spin (at standstill: of positive spin).
+
+    "mixed" where some nodes whirl forward and others backward; nodes that hardly move do not count.
+    """
+    V, W = (shape[[row for row, n in enumerate(names) if n == name]] for name in ("v", "w"))
+    size, area = np.abs(V) ** 2 + np.abs(W) ** 2, 2.0 * np.imag(V * W.conj())
+    moves = size > AT_REST**2 * size.max(initial=0.0)
+    if (area > PLANAR * size)[moves].any() and (area < -PLANAR * size)[moves].any():
+        return "mixed"
+    index = whirl_index(shape, mass, names)
     if abs(index) < PLANAR:
         return "planar"
     return "forward" if (index > 0.0) == (spin >= 0.0) else "backward"

@@ -9,9 +9,10 @@ import pytest
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.modes import modes
 from rubhpc.fem.rotor import assemble_rotor
-from rubhpc.fem.whirl import whirl_index
+from rubhpc.fem.whirl import whirl_index, whirl_word
 from rubhpc.rig.parts import Bearing, Damping, Disc, ShaftSection, Torsion
 from rubhpc.rig.reading import read_rig
+from rubhpc.rig.rig import Rig
 from rubhpc.rig.rotors import Rotor
 
 STEEL = {"youngs_modulus": 2.1e11, "shear_modulus": 8e10, "density": 7800.0}
@@ -253,3 +254,33 @@ def test_whirl_index_of_known_orbits():
     assert whirl_index(np.array([1.0, 2.0, 0.3, 0.1]), mass, names) == pytest.approx(0.0)
     # an ellipse with half axes 3 and 1: (2^2 - 1^2) / (2^2 + 1^2), forward circle 2 and backward 1
     assert whirl_index(np.array([3.0, -1j, 0, 0]), mass, names) == pytest.approx(0.6)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "word"),
+    [
+        ((1, -1j), (0.5, -0.4j), "forward"),
+        ((1, -1j), (0.5, 0.4j), "mixed"),
+        ((1, -1j), (0.005, 0.005j), "forward"),
+    ],
+)
+def test_a_mode_whose_nodes_whirl_either_way_is_mixed(first, second, word):
+    names = ["v", "w", "v", "w"]
+    assert whirl_word(np.array([*first, *second]), np.eye(4), names, 100.0) == word
+    opposite = {"forward": "backward"}.get(word, word)
+    assert whirl_word(np.array([*first, *second]), np.eye(4), names, -100.0) == opposite
+
+
+def test_whirl_in_unlike_bearings_is_mixed_and_in_equal_ones_is_not():
+    words = {}
+    for kzz in (2e7, 8e6):
+        section = ShaftSection(length=1.2, outer_diameter=0.06, elements=6, **STEEL)
+        disc = Disc(node=3, diameter=0.3, thickness=0.03, density=7800.0)
+        bearings = tuple(Bearing(node=n, kyy=2e7, kzz=k) for n, k in ((1, kzz), (6, 1.5 * kzz)))
+        if kzz == 2e7:
+            bearings = tuple(Bearing(node=n, stiffness=2e7) for n in (1, 6))
+        rotor = Rotor(shaft=(section,), disc=(disc,), bearing=bearings, torsion=Torsion(fixed_node=1))
+        found = modes(assemble(Rig(name="a", rotor=rotor)).rotor, 400.0)
+        words[kzz] = {mode.whirl for mode in found if mode.kind == "lateral" and mode.frequency > 0.0}
+    assert words[2e7] == {"forward", "backward"}
+    assert "mixed" in words[8e6]
