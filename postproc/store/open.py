@@ -78,6 +78,7 @@ def _open(path: Path, chunks: Any, without: Sequence[str] = ()) -> xr.Dataset:
         # A store made by other tools may lack consolidated metadata. Durations in seconds stay numbers, and
         # nothing here is a date.
         warnings.simplefilter("ignore", RuntimeWarning)
+        warnings.simplefilter("ignore", UserWarning)  # of the private directory, without such metadata
         store = xr.open_zarr(
             RegularFiles(path),
             chunks=chunks,

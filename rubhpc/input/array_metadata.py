@@ -58,6 +58,8 @@ def read_metadata(path: Path, root: Path) -> tuple[bytes, dict[str, int]]:
         content = json.loads(data)
         name = "" if path.parent == root else path.parent.relative_to(root).as_posix()
         members = {name: content} | _members(content)
+        if not all(member.isprintable() for member in members):
+            raise ValueError("a name of control characters")
         most = {
             member: _checked(about, root / member)
             for member, about in members.items()
@@ -87,8 +89,6 @@ def _members(content: dict[str, Any]) -> dict[str, Any]:
     """The metadata of all arrays and groups below, where a group contains them."""
     held = content.get("consolidated_metadata")
     members: dict[str, Any] = {} if held is None else held["metadata"]
-    if not all(name.isprintable() for name in members):
-        raise ValueError("a name of control characters")
     return members
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rubhpc.errors import printable
 from rubhpc.schema import DIVERGED, DONE, FAILED, INFERRED, MISSING, STATUS
 from rubhpc.storage.disk import disk_errors
 from rubhpc.storage.duration import duration
@@ -149,7 +150,7 @@ def read_status(path: Path) -> StoreStatus:
         failures=tuple(
             (
                 f"{manifest.case_id(i)[:12]} {manifest.name_case(i)}: {STATUS[ledger.status[i]]}",
-                ledger.reasons.get(i, ""),
+                printable(ledger.reasons.get(i, "")),
             )
             for i in sorted(troubled | ledger.reasons.keys())
         ),
