@@ -1,4 +1,4 @@
-"""Run-ups without contact against ROSS's time response with an array of speeds (guide, run-ups).
+"""Run-ups without contact against ROSS's time response with an array of speeds (theory, run-ups).
 
     python tests/bench/ross_run_up.py
 

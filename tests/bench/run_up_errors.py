@@ -1,4 +1,4 @@
-"""What run-ups of the overhung pump of the tests err by, over two revolutions from rest (guide, run-ups).
+"""What run-ups of the overhung pump of the tests err by, over two revolutions from rest (guide, performance).
 
     python tests/bench/run_up_errors.py
 

@@ -1,4 +1,4 @@
-"""What steep passages of a rotor in three tabulated bearings cost and err by (guide, run-ups).
+"""What steep passages of a rotor in three tabulated bearings cost and err by (guide, performance).
 
     python tests/bench/steep_passages.py
 
