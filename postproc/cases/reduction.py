@@ -251,9 +251,12 @@ def _mean(values: Any, axis: tuple[int, ...]) -> Any:
 def _largest(values: Any, axis: tuple[int, ...]) -> Any:
     """Largest of what is no NaN; NaN, without a warning, where nothing else is."""
     values = _lazy(values)
-    return da.reduction(  # type: ignore[no-untyped-call]
-        values, np.fmax.reduce, np.fmax.reduce, axis=axis, dtype=values.dtype
-    )
+    return da.reduction(values, _fmax, _fmax, axis=axis, dtype=values.dtype)  # type: ignore[no-untyped-call]
+
+
+def _fmax(values: Any, axis: tuple[int, ...], keepdims: bool) -> Any:
+    """Largest along axes, by a function that states its arguments, which dask reads; numpy's from 2.4 on."""
+    return np.fmax.reduce(values, axis=axis, keepdims=keepdims)
 
 
 def _lazy(values: Any) -> Any:
