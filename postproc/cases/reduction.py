@@ -254,9 +254,9 @@ def _largest(values: Any, axis: tuple[int, ...]) -> Any:
     return da.reduction(values, _fmax, _fmax, axis=axis, dtype=values.dtype)  # type: ignore[no-untyped-call]
 
 
-def _fmax(values: Any, axis: tuple[int, ...], keepdims: bool) -> Any:
-    """Largest along axes, by a function that states its arguments, which dask reads; numpy's from 2.4 on."""
-    return np.fmax.reduce(values, axis=axis, keepdims=keepdims)
+def _fmax(values: Any, **along: Any) -> Any:
+    """Largest along axes; dask reads the arguments of what reduces, which numpy itself states from 2.4 on."""
+    return np.fmax.reduce(values, **along)
 
 
 def _lazy(values: Any) -> Any:
