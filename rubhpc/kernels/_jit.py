@@ -61,14 +61,14 @@ def _imported_by(path: Path) -> frozenset[Path]:
 
 @cache
 def _sources_of(path: Path) -> str:
-    """Digest of all sources that the kernels of a file are compiled from: the file and its imports."""
+    """Digest of all that the kernels of a file are compiled from: the file and its imports, by this numba."""
     found: set[Path] = set()
     waiting = {path}
     while waiting:
         found |= waiting
         waiting = {file for known in waiting for file in _imported_by(known)} - found
     sources = b"".join(file.read_bytes() for file in sorted(found))
-    return hashlib.sha256(sources).hexdigest()
+    return hashlib.sha256(numba.__version__.encode() + sources).hexdigest()
 
 
 class Compilation:

@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -103,7 +104,9 @@ def _copy_to(folder: Path) -> None:
 
 def _sources() -> str:
     stats = [(path.name, path.stat()) for path in sorted(KERNELS.glob("*.py"))]
-    return repr([sys.version, *((name, stat.st_mtime_ns, stat.st_size) for name, stat in stats)])
+    return repr(
+        [sys.version, version("numba"), *((name, stat.st_mtime_ns, stat.st_size) for name, stat in stats)]
+    )
 
 
 def _is_current(stamp: Path) -> bool:
