@@ -75,12 +75,14 @@ def stated_size(compressor: str, data: bytes) -> int:
     """Bytes into which a chunk says that it decodes, without decoding it; -1 where it does not say."""
     if compressor == "blosc":
         return int.from_bytes(data[4:8], "little") if len(data) >= 16 else -1
-    if len(data) < 14 or data[:4] != b"\x28\xb5\x2f\xfd":
+    if len(data) < 6 or data[:4] != b"\x28\xb5\x2f\xfd":
         return -1
     flags = data[4]
     is_single, n_dictionary = bool(flags & 32), (0, 1, 2, 4)[flags & 3]
     n_size = (1 if is_single else 0, 2, 4, 8)[flags >> 6]
     start = 5 + (not is_single) + n_dictionary
+    if len(data) < start + n_size:
+        return -1
     stated = int.from_bytes(data[start : start + n_size], "little")
     return stated + 256 * (n_size == 2) if n_size else -1
 

@@ -11,6 +11,7 @@ from postproc.report.page import Page
 from postproc.signals.places import moved_at, named_places
 from postproc.signals.spectra import spectrum_data
 from postproc.signals.waveforms import orbit_data, waveform_data
+from postproc.store.attributes import table_of
 from rubhpc.errors import InputError
 from rubhpc.running.driver import run
 from rubhpc.study.cases import CaseGrid
@@ -97,9 +98,8 @@ def test_a_place_is_chosen_by_its_node_or_stator(cases):
         moved_at(one, stator=2)
     with pytest.raises(InputError, match="give one of them"):
         moved_at(one, node=8, stator=1)
-    waves = one.assign_attrs(
-        rig=one.attrs["rig"] | {"stator": [one.attrs["rig"]["stator"][0] | {"node": 4, "radius": 0.06}]}
-    )
+    rig = table_of(one, "rig")
+    waves = one.assign_attrs(rig=rig | {"stator": [rig["stator"][0] | {"node": 4, "radius": 0.06}]})
     shown = moved_at(waves, node=8)  # no longer the recorded one, seen by left and aside
     assert shown["vertical"].attrs["place"] == "motion at node 8"
     assert shown["vertical"].values == pytest.approx(one["vertical"].values, abs=1e-10)
