@@ -137,12 +137,14 @@ def draw_stators(data: xr.Dataset, ax: Axes, factor: float, reach: float) -> Non
         return
     edge = {"edgecolor": "0.6", "linestyle": ":", "linewidth": 0.7}
     places, is_moved = stator_places(data), "carrier_vertical" in data
-    shifts = _shifts(data) * factor if is_moved else np.zeros((len(places), 2))
+    shifts = np.array([place[2:] for place in places]).reshape(-1, 2) * factor
+    if is_moved:
+        shifts += _shifts(data) * factor
     centre = shifts[0] if len(shifts) and (shifts == shifts[0]).all() else np.zeros(2)
     ax.add_patch(Circle((centre[0], centre[1]), clearance, fill=False, zorder=1, **edge))
     ax.plot([], [], color="0.6", linestyle=":", label="clearance")
     half_angle = math.pi / max(len(places), 3)  # the stators of a ring do not overlap
-    for i, (angle, offset) in enumerate(places):
+    for i, (angle, offset, *_) in enumerate(places):
         gap = clearance + offset * factor
         # Normal from the disc to the stator and tangent along its face; the plane is (horizontal, vertical).
         n, t = np.array([np.sin(angle), np.cos(angle)]), np.array([np.cos(angle), -np.sin(angle)])

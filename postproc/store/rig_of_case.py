@@ -112,15 +112,19 @@ def _over_rig(
     }
 
 
-def stator_places(case: xr.Dataset) -> list[tuple[float, float]]:
+def stator_places(case: xr.Dataset) -> list[tuple[float, ...]]:
     """Return angle (rad, from straight up with the spin) and clearance offset (m) of the stators at the disc.
 
-    The disc is the one whose motion is recorded, at the node of the first stator; others touch another disc.
+    Then follow the horizontal and the vertical position, m, of the shaft about which they are set. The disc
+    is the one whose motion is recorded, at the node of the first stator; others touch another disc.
     """
+    from rubhpc.fem.assemble import assemble
+
     if "rig" not in case.attrs:
         return []
-    stators = rig_of(case).stator
-    return [(s.angle, s.clearance_offset) for s in stators if s.node == stators[0].node]
+    rig = rig_of(case)
+    up, across = (0.0, 0.0) if rig.rotor.aligned_at is None else assemble(rig).stators[0].centre
+    return [(s.angle, s.clearance_offset, across, up) for s in rig.stator if s.node == rig.stator[0].node]
 
 
 def has_beams(case: xr.Dataset) -> bool:

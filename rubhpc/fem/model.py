@@ -63,7 +63,7 @@ class SpeedDependence:
         return stiffness, damping
 
     def journals_at(self, spin: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the degrees whose static positions are given at a spin, rad/s, (n, n_dof), and these (n,), m."""
+        """Return the degrees of journals that are placed at a spin, rad/s, (n, n_dof), and where, (n,), m."""
         found = {}
         for support in self.supports:
             eccentricity = support.table.eccentricity(spin, support.name)
