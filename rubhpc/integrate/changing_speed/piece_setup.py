@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from rubhpc.fem.probes import seen_at_rest
+from rubhpc.fem.statics import at_rest_under
 from rubhpc.integrate.changing_speed.followed_modes import between
 from rubhpc.integrate.changing_speed.retuned_curved import RetunedCurvedLibrary
 from rubhpc.integrate.changing_speed.retuned_laws import RetunedFrictionLibrary, RetunedPenaltyLibrary
@@ -158,8 +159,10 @@ class HeldMatrices:
             if within:
                 sag = between([model.sag for model in models], within)
                 rows = between([model.probe_rows[0] for model in models], within)
-            if within and film is not None:
-                film = between([model.film for model in models if model.film is not None], within)
+            if within and film is not None:  # positions of journals may turn where no matrix does
+                known = self.model.rotor.tabulated_speeds
+                at = min(max(speed, known[0]), known[-1])
+                sag, film = at_rest_under(self.model.rotor.at(at), self.model.load, at)
             sag = sag + torque * self.twist + acceleration * self.lean
             self._latest = asked, sagging(self.model, sag, film, rows)
         return self._latest[1]
