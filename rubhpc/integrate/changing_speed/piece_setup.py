@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from rubhpc.fem.probes import seen_at_rest
+from rubhpc.fem.probes import probes_at, seen_at_rest
 from rubhpc.fem.statics import at_rest_under
 from rubhpc.integrate.changing_speed.followed_modes import between
 from rubhpc.integrate.changing_speed.retuned_curved import RetunedCurvedLibrary
@@ -156,13 +156,14 @@ class HeldMatrices:
         asked = torque, acceleration, within
         if self._latest is None or self._latest[0] != asked:
             sag, film, rows = models[0].sag, models[0].film, models[0].probe_rows[0]
-            if within:
+            if within and film is None:
                 sag = between([model.sag for model in models], within)
                 rows = between([model.probe_rows[0] for model in models], within)
-            if within and film is not None:  # positions of journals may turn where no matrix does
+            elif within:  # positions of journals may bend where no matrix does
                 known = self.model.rotor.tabulated_speeds
-                at = min(max(speed, known[0]), known[-1])
+                at, before = np.clip([speed, self.reduced.spin], known[0], known[-1]).tolist()
                 sag, film = at_rest_under(self.model.rotor.at(at), self.model.load, at)
+                rows = probes_at(self.model, at, before).probe_rows[0]
             sag = sag + torque * self.twist + acceleration * self.lean
             self._latest = asked, sagging(self.model, sag, film, rows)
         return self._latest[1]
