@@ -92,8 +92,8 @@ class BearingTable:
     )
     eccentricity_z: tuple[float, ...] | None = series(
         "m",
-        doc="Horizontal static position of the journal in the film; 0 where only the other one is given.",
-        example="[15e-6, 18e-6, 16e-6]",
+        doc="Horizontal static position, along +z; 0 where only the vertical one is given.",
+        example="[-15e-6, -18e-6, -16e-6]",
         default=None,
     )
     interpolation: str = choice(

@@ -356,9 +356,9 @@ CASES = [
         rig=_edited(RIG, 'mass = "8 g"', "mass = 0"),
     ),
     Malformed(
-        "offset closes the gap",
+        "offset closes the gap of a wall",
         ("study.toml", "[grid] clearance", "clearance_offset"),
         study=_edited(STUDY, _GAP, 'clearance = "0.1 mm"'),
-        rig=_edited(RIG, "angle = 0.0", 'angle = 0.0\nclearance_offset = "-0.2 mm"'),
+        rig=RIG + b'\n[[stator]]\nnode = 8\nangle = 3.0\nrigid = true\nclearance_offset = "-0.2 mm"\n',
     ),
 ]
