@@ -359,6 +359,6 @@ CASES = [
         "offset closes the gap of a wall",
         ("study.toml", "[grid] clearance", "clearance_offset"),
         study=_edited(STUDY, _GAP, 'clearance = "0.1 mm"'),
-        rig=RIG + b'\n[[stator]]\nnode = 8\nangle = 3.0\nrigid = true\nclearance_offset = "-0.2 mm"\n',
+        rig=f'{RIG}\n[[stator]]\nnode = 8\nangle = 3.0\nrigid = true\nclearance_offset = "-0.2 mm"\n'.encode(),
     ),
 ]
