@@ -358,7 +358,7 @@ CASES = [
     Malformed(
         "offset closes the gap of a wall",
         ("study.toml", "[grid] clearance", "clearance_offset"),
-        study=_edited(STUDY, _GAP, 'clearance = "0.1 mm"'),
-        rig=f'{RIG}\n[[stator]]\nnode = 8\nangle = 3.0\nrigid = true\nclearance_offset = "-0.2 mm"\n'.encode(),
+        study=b'rig = "own.toml"\n[grid]\nspeed = 100\nclearance = "0.1 mm"\nfriction = 0.1',
+        rig=f'{RIG}\n[[stator]]\nnode = 8\nangle = 3\nrigid = true\nclearance_offset = "-0.2 mm"'.encode(),
     ),
 ]
