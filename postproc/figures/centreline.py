@@ -47,7 +47,7 @@ def draw_centreline(
     data: xr.Dataset,
     ax: Axes,
     where: str = "the disc",
-    clearance: tuple[float, float, float] | None = None,
+    clearance: tuple[float, ...] | None = None,
 ) -> Axes:
     """Draw the mean position, vertical over horizontal; positive spin turns clockwise.
 
@@ -83,7 +83,7 @@ def draw_centreline(
     return ax
 
 
-def _clearance(cases: xr.Dataset) -> tuple[float, float, float] | None:
+def _clearance(cases: xr.Dataset) -> tuple[float, ...] | None:
     """Clearance of a ring around the disc, as a circle, m; None where there is none, or it is unknown."""
     if "rig" not in cases.attrs or "clearance" not in cases.coords or cases["clearance"].size != 1:
         return None

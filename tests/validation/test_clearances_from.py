@@ -86,6 +86,17 @@ def test_a_rising_shaft_meets_the_upper_stator_where_the_table_says():
     assert np.abs(np.diff(before)).max() < 5e-9  # it creeps
 
 
+def test_a_driven_rotor_rises_too():
+    rig, drive = in_films(), {"start": "1500 rpm", "torque": 2.0, "inertia": 0.01, "revolutions": 12}
+    passage = run_up(rig, clearance="25 um", drive=drive)
+    model, speeds = assemble(rig), passage.speed.values
+    n_free = int(passage.contact_fraction.any("stator").values.argmax())
+    assert speeds[n_free] / RPM == pytest.approx(1750, abs=40)
+    known = [sag_at(model.rotor, model_at(model, speed).sag, 8)[0] for speed in speeds[:n_free]]
+    mean = passage.vertical.values.reshape(len(speeds), -1).mean(axis=1)[:n_free]
+    assert mean == pytest.approx(known, abs=0.05 * np.ptp(known))
+
+
 def test_a_speed_of_alignment_is_that_of_the_tables():
     model = assemble(in_films(**{"rotor.clearance_from": "2000 rpm"}))
     there = model_at(model, 2000 * RPM)

@@ -152,7 +152,8 @@ class HeldMatrices:
     def sagging(self, torque: float, acceleration: float, speed: float) -> Model:
         """The model with the sag under a drive's torque, N m, at an acceleration and a speed, rad/s."""
         models = self.sagging_models or [self.model]
-        within = self.within(speed) if self.sagging_models else 0.0
+        is_moving = self.sagging_models or self.model.film is not None
+        within = self.within(speed) if is_moving else 0.0
         asked = torque, acceleration, within
         if self._latest is None or self._latest[0] != asked:
             sag, film, rows = models[0].sag, models[0].film, models[0].probe_rows[0]
