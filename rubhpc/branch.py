@@ -22,6 +22,7 @@ from rubhpc.integrate.periodic_motions.shooting import NotConverged
 from rubhpc.integrate.record import State
 from rubhpc.rig.reading import read_rig
 from rubhpc.rig.rig import Rig
+from rubhpc.rig.stators import gap_problem
 from rubhpc.study.axis_reading import unit_of
 from rubhpc.study.branch_keys import LONGEST_PERIOD, check_followed
 from rubhpc.study.study import Recording
@@ -182,10 +183,8 @@ def _range(rig: Rig, along: str, start: float | str, stop: float | str) -> tuple
     least = min(first, last)
     if along in ("friction", "clearance_ratio") and least < 0.0:
         raise InputError(f"branch: {name}: {value} is out of range; {along} must be at least 0")
-    offset = min((stator.clearance_offset for stator in rig.stator), default=0.0)
-    if along == "clearance" and least + offset <= 0.0:
-        problem = f"{least:g} m and a stator's clearance_offset of {offset:g} m leave no gap"
-        raise InputError(f"branch: {name}: {problem}; use a larger one")
+    if along == "clearance" and (problem := gap_problem(rig.stator, least)):
+        raise InputError(f"branch: {name}: {problem}")
     return first, last
 
 

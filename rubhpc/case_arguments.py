@@ -22,6 +22,7 @@ from rubhpc.recent import recent
 from rubhpc.rig.probes import Probe
 from rubhpc.rig.reading import packaged_name, read_rig, with_keys
 from rubhpc.rig.rig import Rig
+from rubhpc.rig.stators import gap_problem
 from rubhpc.study.contact_keys import ContactArguments
 from rubhpc.study.initial import Initial, check_initials
 from rubhpc.study.state_of_case import with_state
@@ -164,11 +165,9 @@ def _assembled(
         gap = ratio * amplitude
     else:
         gap = parse_quantity(clearance, "m", f"{caller}: clearance")
-    for stator in model.stators:
-        if gap + stator.clearance_offset <= 0:
-            offset = stator.clearance_offset
-            problem = f"{gap:g} m and a stator's clearance_offset of {offset:g} m leave no gap"
-            raise InputError(f"{caller}: clearance: {problem}; use a larger one")
+    is_ratio = clearance_ratio is not None
+    if problem := gap_problem(rig.stator, gap, is_ratio=is_ratio):
+        raise InputError(f"{caller}: {'clearance_ratio' if is_ratio else 'clearance'}: {problem}")
     mu = parse_quantity(given.get("friction", FRICTION), "", f"{caller}: friction")
     if mu < 0:
         raise InputError(f"{caller}: friction: {mu:g} is out of range; it must be at least 0")

@@ -224,7 +224,8 @@ class _Knocks:
         )
         is_vertical = np.array([name == "v" for _, name in model.rotor.degrees])
         mass = float(model.rotor.mass[np.ix_(is_vertical, is_vertical)].sum())
-        self.scale = mass * first_lateral_frequency(model) * case.clearance
+        reach = abs(case.clearance) or case.contact_free_amplitude
+        self.scale = mass * first_lateral_frequency(model) * reach
 
     def compile(self) -> None:
         """Compile what a knock calls."""

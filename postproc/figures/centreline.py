@@ -10,7 +10,7 @@ from postproc.figures.drawing import Drawing
 from postproc.figures.run_up_marks import APART, draw_rotation, name_speeds
 from postproc.signals.places import moved_at
 from postproc.signals.run_up_spectra import mean_positions
-from postproc.store.rig_of_case import stators_around
+from postproc.store.rig_of_case import stator_places, stators_around
 from rubhpc.units import scale_for
 
 if TYPE_CHECKING:
@@ -55,25 +55,29 @@ def centreline(
 
 
 def draw_centreline(
-    data: xr.Dataset, ax: Axes, where: str = "the disc", clearance: float | None = None
+    data: xr.Dataset,
+    ax: Axes,
+    where: str = "the disc",
+    clearance: tuple[float, ...] | None = None,
 ) -> Axes:
     """Draw the mean position, vertical over horizontal; positive spin turns clockwise.
 
-    A `clearance` (m) is drawn as a circle around the shaft without loads, unless it is far beyond.
+    A `clearance` is a circle, unless it is far beyond: its radius and the horizontal and vertical position of
+    its middle, m.
     """
     x, y, speed = (data[name].values for name in ("horizontal", "vertical", "speed"))
     scale = scale_for("m", float(np.nanmax(np.hypot(x, y))))
     x, y = x * scale.factor, y * scale.factor
     reach = 0.62 * max(float(np.ptp(x)), float(np.ptp(y)), 1e-3 * float(np.abs([x, y]).max()))
     middle = 0.5 * (x.max() + x.min()), 0.5 * (y.max() + y.min())
-    radius = 0.0 if clearance is None else clearance * scale.factor
+    radius, *at = (scale.factor * size for size in clearance or (0.0, 0.0, 0.0))
     if 0.0 < radius < FAR * float(np.hypot(x, y).max()):
-        reach, middle = 1.08 * max(radius, float(np.abs([x, y]).max())), (0.0, 0.0)
+        middle = at[0], at[1]
+        reach = 1.08 * max(radius, float(np.abs([x - middle[0], y - middle[1]]).max()))
         around = np.linspace(0.0, 2.0 * np.pi, 361)
-        ax.plot(
-            radius * np.cos(around), radius * np.sin(around), color="0.5", linewidth=0.7, label="clearance"
-        )
-        ax.plot(0.0, 0.0, "+", color="0.5", markersize=5, markeredgewidth=0.7)
+        across, up = middle[0] + radius * np.cos(around), middle[1] + radius * np.sin(around)
+        ax.plot(across, up, color="0.5", linewidth=0.7, label="clearance")
+        ax.plot(*middle, "+", color="0.5", markersize=5, markeredgewidth=0.7)
         ax.legend(loc="lower right", fontsize=6, frameon=False)
     ax.set(
         xlim=(middle[0] - reach, middle[0] + reach),
@@ -90,7 +94,9 @@ def draw_centreline(
     return ax
 
 
-def _clearance(cases: xr.Dataset) -> float | None:
-    """Radial clearance of a ring around the place, m; None where no ring stands there, or it is unknown."""
+def _clearance(cases: xr.Dataset) -> tuple[float, ...] | None:
+    """Clearance of a ring around the place, as a circle, m; None without a ring, or where it is unknown."""
     is_known = "clearance" in cases.coords and cases["clearance"].size == 1
-    return float(cases["clearance"].item()) if is_known and len(stators_around(cases)) >= RING else None
+    if not is_known or len(stators_around(cases)) < RING:
+        return None
+    return (float(cases["clearance"].item()), *stator_places(cases)[0][2:])

@@ -223,14 +223,16 @@ def draw_stators(
     clearance = float(data["clearance"].values) * factor
     edge = {"edgecolor": "0.6", "linestyle": ":", "linewidth": 0.7}
     places, is_moved = stator_places(data), "carrier_vertical" in data
-    shifts = np.zeros((len(places), 2)) if centre is None else np.tile(centre, (len(places), 1))
+    shifts = np.array([place[2:] for place in places]).reshape(-1, 2) * factor
+    if centre is not None:
+        shifts = shifts + centre
     if is_moved:
         shifts = shifts + _shifts(data) * factor
-    middle = shifts[0] if (shifts == shifts[:1]).all() else shifts.mean(axis=0)
+    middle = shifts.mean(axis=0) if len(shifts) else np.zeros(2)
     ax.add_patch(Circle((middle[0], middle[1]), clearance, fill=False, zorder=1, **edge))
     ax.plot([], [], color="0.6", linestyle=":", label="clearance")
     half_angle = math.pi / max(len(places), 3)  # the stators of a ring do not overlap
-    for i, (angle, offset) in enumerate(places):
+    for i, (angle, offset, *_) in enumerate(places):
         gap = clearance + offset * factor
         # Normal from the disc to the stator and tangent along its face; the plane is (horizontal, vertical).
         n, t = np.array([np.sin(angle), np.cos(angle)]), np.array([np.cos(angle), -np.sin(angle)])

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 _READ_AT_ONCE = 64_000_000  # bytes
 _SPARSE = 16  # cases read for each that is asked for, beyond which they are read one by one
-_MOVED = re.compile(r"stator(\.\d+)?\.(angle|clearance_offset|node)")
+_MOVED = re.compile(r"stator(\.\d+)?\.(angle|clearance_offset|node)|rotor\.clearance_from")
 
 
 class Cases:
@@ -42,7 +42,10 @@ class Cases:
         self.done = np.flatnonzero(self.status == DONE)
         self._window = self._whole_chunks(store[kept]) if kept else [1] * len(self._axes)
         grid = table_of(store, "study").get("grid", {})
-        self.stators_move = any(_MOVED.fullmatch(name) for name in grid)
+        is_set_about = "clearance_from" in table_of(store, "rig").get("rotor", {})
+        self.stators_move = any(
+            _MOVED.fullmatch(name) or (is_set_about and name.startswith("rotor.")) for name in grid
+        )
 
     def has_record(self, flat: int) -> bool:
         """Whether there is anything to be read of a case."""

@@ -83,7 +83,7 @@ LEVELS = (  # of a page with a limited size, from the best
 )
 
 
-def pack_case(case: xr.Dataset, detail: Detail, places: list[tuple[float, float]] | None = None) -> bytes:
+def pack_case(case: xr.Dataset, detail: Detail, places: list[tuple[float, ...]] | None = None) -> bytes:
     """Return one case, loaded, as a record for the page.
 
     Values are SI. What the store does not keep is left out; spectra are taken over whole periods where

@@ -146,7 +146,7 @@ class Page:
             "reasons": {str(i): text for i, text in store.attrs.get("reasons", {}).items()},
         }
 
-    def _places(self) -> list[tuple[float, float]]:
+    def _places(self) -> list[tuple[float, ...]]:
         try:
             return stator_places(self._store)
         except RubError:

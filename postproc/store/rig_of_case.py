@@ -129,10 +129,20 @@ def stators_around(case: xr.Dataset) -> list[int]:
     return [i for i, stator in enumerate(rig_of(case).stator) if stator.node == node]
 
 
-def stator_places(case: xr.Dataset) -> list[tuple[float, float]]:
-    """Return angle (rad, from straight up with the spin) and clearance offset (m) of the stators around."""
+def stator_places(case: xr.Dataset) -> list[tuple[float, ...]]:
+    """Return angle (rad, from straight up with the spin) and clearance offset (m) of the stators around.
+
+    Then follow the horizontal and the vertical position, m, of the shaft about which they are set.
+    """
+    from rubhpc.fem.assemble import assemble
+
     around = stators_around(case)
-    return [(s.angle, s.clearance_offset) for s in (rig_of(case).stator[i] for i in around)]
+    if not around:
+        return []
+    rig = rig_of(case)
+    is_set_about = rig.rotor.aligned_at is not None
+    up, across = assemble(rig).stators[around[0]].centre if is_set_about else (0.0, 0.0)
+    return [(s.angle, s.clearance_offset, across, up) for s in (rig.stator[i] for i in around)]
 
 
 def has_beams(case: xr.Dataset) -> bool:

@@ -86,6 +86,7 @@ def modes(
     from rubhpc.fem.linear_design import linear_design
     from rubhpc.fem.modes import modes as find_modes
     from rubhpc.fem.stability import instability_message
+    from rubhpc.fem.statics import sag_remark
     from rubhpc.rig.reading import read_rig
 
     if nodes and shapes:
@@ -107,7 +108,7 @@ def modes(
     for spin in spins:
         if message := instability_message(model, spin):
             click.echo(f"warning: {message}", err=True)
-    for message in dict.fromkeys(undamped_message(model, spin) for spin in spins):
+    for message in dict.fromkeys([sag_remark(model), *(undamped_message(model, spin) for spin in spins)]):
         if message:
             click.echo(f"warning: {message}", err=True)
     design = None

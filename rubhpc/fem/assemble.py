@@ -11,12 +11,15 @@ from rubhpc.fem.computable import MOST_DEGREES, check_computable, computable
 from rubhpc.fem.forces import forces_on
 from rubhpc.fem.model import Model
 from rubhpc.fem.rotor import assemble_rotor
-from rubhpc.fem.statics import sag_under
+from rubhpc.fem.statics import at_rest_under, sag_at
 from rubhpc.fem.stator import assemble_stator
 from rubhpc.rig.stators import Stator
 
 if TYPE_CHECKING:
-    from rubhpc.fem.model import CarrierModel, StatorModel
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from rubhpc.fem.model import Body, CarrierModel, StatorModel
     from rubhpc.rig.rig import Rig
     from rubhpc.rig.stators import AnyStator
 
@@ -54,14 +57,18 @@ def assemble(rig: Rig) -> Model:
             problem = f"rotor and {len(rig.stator)} stators have more than {MOST_DEGREES} degrees of freedom"
             raise InputError(f"rig {rig.name}: {problem}; use fewer elements")
     stators, carriers = _on_carriers(rig, stators)
+    if rig.rotor.aligned_at is not None:
+        stators = _set_about_the_shaft(stators, body, constant, rig.rotor.aligned_at)
+    sag, film = at_rest_under(body, constant, 0.0)
     return Model(
         rotor=body,
         unbalance_cosine=cosine,
         unbalance_sine=sine,
         stators=tuple(stators),
         output_node=rig.rotor.recorded_node([stator.node for stator in rig.stator]),
-        sag=sag_under(body, constant),
+        sag=sag,
         load=constant,
+        film=film,
         carriers=tuple(carriers),
     )
 
@@ -77,7 +84,20 @@ def model_at(model: Model, spin: float) -> Model:
     if model.rotor.by_speed is None:
         return model
     rotor = model.rotor.at(spin)
-    return replace(model, rotor=rotor, sag=sag_under(rotor, model.load))
+    sag, film = at_rest_under(rotor, model.load, spin)
+    return replace(model, rotor=rotor, sag=sag, film=film)
+
+
+def _set_about_the_shaft(
+    stators: list[StatorModel], body: Body, load: NDArray[np.float64], spin: float
+) -> list[StatorModel]:
+    """Stators set about the centre of the shaft where it rests under its loads at a spin, rad/s."""
+    try:
+        turning = body.at(spin)
+    except InputError as error:
+        raise InputError(f"[rotor] clearance_from: {error}") from None
+    sag, _ = at_rest_under(turning, load, spin)
+    return [replace(stator, centre=sag_at(turning, sag, stator.node)) for stator in stators]
 
 
 def _on_carriers(rig: Rig, stators: list[StatorModel]) -> tuple[list[StatorModel], list[CarrierModel]]:

@@ -62,6 +62,20 @@ class SpeedDependence:
             couple(damping, c + self.proportional * k, support.rows, support.far)
         return stiffness, damping
 
+    def journals_at(self, spin: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the degrees of journals that are placed at a spin, rad/s, (n, n_dof), and where, (n,), m."""
+        found = {}
+        for support in self.supports:
+            eccentricity = support.table.eccentricity(spin, support.name)
+            for i, row in enumerate(support.rows):
+                if eccentricity is None or row < 0:
+                    continue
+                if row in found:
+                    problem = f"another table at node {support.table.node} gives the position of the journal"
+                    raise InputError(f"{support.name}: eccentricity_y: {problem}; remove one of them")
+                found[row] = eccentricity[i]
+        return np.eye(len(self.stiffness))[list(found)], np.array(list(found.values()))
+
 
 def couple(
     matrix: NDArray[np.float64], block: NDArray[np.float64], rows: Sequence[int], far: Sequence[int]
@@ -173,6 +187,7 @@ class StatorModel:
     lateral: int  # row of the tip's lateral displacement; -1 without lateral freedom
     # (n_dof, n_dof), 1/m: the tip draws back by half the form of the displacements; None: not counted
     squared_slope: NDArray[np.float64] | None = None
+    centre: tuple[float, float] = (0.0, 0.0)  # m, about which it is set: v and w of the shaft there
     alone: StatorModel | None = None  # on a carrier: while that is held; `body` is all that stands on it
 
     @cached_property
@@ -241,6 +256,9 @@ class Model:
     load: NDArray[np.float64]  # (n_dof,), constant loads on the rotor, N or N m
     carriers: tuple[CarrierModel, ...] = ()
     probe: ProbeRows | None = None
+    film: NDArray[np.float64] | None = (
+        None  # (n_dof,), N: what holds journals beyond `K sag = load`, if given
+    )
 
     @cached_property
     def bodies(self) -> tuple[Body, ...]:

@@ -12,6 +12,7 @@ from rubhpc.errors import InputError
 from rubhpc.fem.carrier import own_matrices
 from rubhpc.fem.damping import rayleigh_coefficients
 from rubhpc.fem.model import ProbeRows
+from rubhpc.fem.statics import sag_at
 from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.rig.probes import MOTIONS, TWISTS
 from rubhpc.rig.rotors import Rotor
@@ -51,8 +52,19 @@ def with_probes(model: Model, rig: Rig, probes: Sequence[Probe], spin: float) ->
             _fill(rows[:, i], probe, model, rig, spin)
         except InputError as error:
             raise InputError(f"[record] probe {probe.name}: {error}") from None
-    constant = rows[DISPLACEMENT][:, : model.rotor.n_dof] @ model.sag
+    constant = seen_at_rest(model, probes, rows[DISPLACEMENT])
     return replace(model, probe=ProbeRows(probes=probes, rows=rows, constant=constant))
+
+
+def seen_at_rest(model: Model, probes: Sequence[Probe], rows: Floats) -> Floats:
+    """Return what probes see of the sag, (n_probe,), from their factors of displacements (n_probe, n_all)."""
+    constant: Floats = rows[:, : model.rotor.n_dof] @ model.sag
+    for i, probe in enumerate(probes):
+        if model.film is not None and probe.quantity == "bearing_force":
+            assert probe.node is not None
+            up, aside = sag_at(model.rotor, model.film, probe.node)
+            constant[i] -= math.cos(probe.angle) * up + math.sin(probe.angle) * aside
+    return constant
 
 
 def probes_at(model: Model, spin: float, before: float) -> Model:
@@ -72,7 +84,7 @@ def probes_at(model: Model, spin: float, before: float) -> Model:
                 at = (support.rows, support.far)
                 _add_force(rows[DISPLACEMENT, i], direction @ stiffness, *at)
                 _add_force(rows[VELOCITY, i], direction @ (damping + by_speed.proportional * stiffness), *at)
-    constant = rows[DISPLACEMENT][:, : model.rotor.n_dof] @ model.sag
+    constant = seen_at_rest(model, model.probe.probes, rows[DISPLACEMENT])
     return replace(model, probe=replace(model.probe, rows=rows, constant=constant))
 
 

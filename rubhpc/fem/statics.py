@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
+CROSSED = 1e-12  # of the greatest stiffness, above which a difference across the diagonal is no rounding
+
 
 def sag_under(body: Body, load: Floats) -> Floats:
     """Displacement of a body at rest under a constant load, (n_dof,), m and rad.
@@ -37,17 +39,59 @@ def sag_under(body: Body, load: Floats) -> Floats:
     return sag
 
 
+def at_rest_under(body: Body, load: Floats, spin: float) -> tuple[Floats, Floats | None]:
+    """Return where a rotor at a spin (rad/s) rests under a constant load: `sag` and `film` of a model.
+
+    The sag is that of the dynamic coefficients, `K sag = load`, or, where bearings state the static position
+    of their journals, `K sag = load + film` with the forces (n_dof,) on the journals that hold them there.
+
+    Raises
+    ------
+    InputError
+        When the loaded part of the body is unconstrained.
+    """
+    sag = sag_under(body, load)
+    if body.by_speed is None:
+        return sag, None
+    rows, positions = body.by_speed.journals_at(spin)
+    if not len(rows):
+        return sag, None
+    moved = np.stack([sag_under(body, row) for row in rows], axis=1)
+    film = np.linalg.solve(rows @ moved, positions - rows @ sag) @ rows
+    return sag_under(body, load + film), film
+
+
+def sag_remark(model: Model) -> str:
+    """Return a remark where the sag is that of dynamic coefficients, not of journals at rest; else ""."""
+    rotor = model.rotor
+    skew = np.abs(rotor.stiffness - rotor.stiffness.T).max(initial=0.0)
+    is_dynamic = rotor.by_speed is not None or skew > CROSSED * np.abs(rotor.stiffness).max(initial=0.0)
+    if not (model.load.any() and is_dynamic and model.film is None):
+        return ""
+    return (
+        "the sag under gravity and loads is that of the dynamic coefficients of the bearings; journals rest "
+        "elsewhere in a fluid film: give their tables eccentricity_y and eccentricity_z, m"
+    )
+
+
 def sag_at_stators(model: Model) -> tuple[Floats, Floats]:
     """Reduction of each clearance by the sag, and tangential offset of the tip from the disc, (q,) each, m.
 
-    Displacements are measured from the sagged shaft, relative to which the stators are offset.
+    Displacements are measured from the sagged shaft, relative to which the stators are offset; they are set
+    about their `centre`.
     """
     nearer, aside = np.zeros((2, len(model.stators)))
-    if not model.sag.any():
+    if not model.sag.any() and not any(any(stator.centre) for stator in model.stators):
         return nearer, aside
     for i, stator in enumerate(model.stators):
-        rows = [model.rotor.index(stator.node, name) for name in ("v", "w")]
-        v, w = (model.sag[row] if row >= 0 else 0.0 for row in rows)
+        at = sag_at(model.rotor, model.sag, stator.node)
+        v, w = (now - then for now, then in zip(at, stator.centre, strict=True))
         ey, ez = np.cos(stator.angle), np.sin(stator.angle)
         nearer[i], aside[i] = ey * v + ez * w, ez * v - ey * w
     return nearer, aside
+
+
+def sag_at(body: Body, sag: Floats, node: int) -> tuple[float, float]:
+    """Vertical and horizontal part at a node of a sag (n_dof,), m, or of forces."""
+    v, w = (body.index(node, name) for name in ("v", "w"))
+    return float(sag[v]) if v >= 0 else 0.0, float(sag[w]) if w >= 0 else 0.0

@@ -35,17 +35,21 @@ def quantity(
     above: float | None = None,
     at_least: float | None = None,
     below: float | None = None,
+    or_words: tuple[str, ...] = (),
+    added: bool = False,
 ) -> Any:
-    """Declare a field that holds a finite number in `unit` (SI, readable by pint), within its bounds.
+    """Declare a field that holds a finite number in `unit` (SI, readable by pint), or one of some words.
 
     Parameters
     ----------
     doc, example : str
         Meaning in one line; a value as in a TOML file, `'"0.8 m"'`; for messages and the reference of keys,
         as in all declarations below.
+    added : bool
+        Whether rigs of older stores have no such key.
     """
-    bounds = {"above": above, "at_least": at_least, "below": below}
-    return _declare("quantity", doc, example, default, unit=unit, **bounds)
+    limits = {"above": above, "at_least": at_least, "below": below, "or_words": or_words, "added": added}
+    return _declare("quantity", doc, example, default, unit=unit, **limits)
 
 
 def series(

@@ -28,11 +28,21 @@ class Kind(NamedTuple):
     encode: Callable[[Any], Any] = lambda value: value  # to what TOML and JSON hold
 
 
-def _parse_quantity(value: object, limits: Limits, where: str) -> float:
-    return parse_quantity(value, limits["unit"], where)
+def _parse_quantity(value: object, limits: Limits, where: str) -> float | str:
+    words = limits.get("or_words", ())
+    if isinstance(value, str) and value in words:
+        return value
+    try:
+        return parse_quantity(value, limits["unit"], where)
+    except InputError as error:
+        if not words:
+            raise
+        raise InputError(f"{error}, or {quoted(words)}") from None
 
 
 def _check_quantity(value: object, limits: Limits) -> str:
+    if isinstance(value, str) and value in limits.get("or_words", ()):
+        return ""
     unit = f" {limits['unit']}" if limits["unit"] else ""
     try:
         number = float(value)  # type: ignore[arg-type]
@@ -239,6 +249,10 @@ def _spelled(text: str) -> object:
         return text
 
 
+def _encode_quantity(value: float | str) -> float | str:
+    return value if isinstance(value, str) else float(value)
+
+
 def _encode_degrees(value: Any) -> list[list[Any]]:
     return [list(degree) for degree in value]
 
@@ -248,7 +262,7 @@ def _encode_pairs(value: Any) -> dict[str, float]:
 
 
 KINDS = {
-    "quantity": Kind(_parse_quantity, _check_quantity, encode=float),
+    "quantity": Kind(_parse_quantity, _check_quantity, encode=_encode_quantity),
     "series": Kind(_parse_series, _check_series, encode=list),
     "count": Kind(_parse_count, _check_count),
     "flag": Kind(_parse_flag, _check_flag),

@@ -19,7 +19,7 @@ from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.packing import degrees_of
 from rubhpc.integrate.record import State
 from rubhpc.kernels.complementarity import UNSOLVED
-from rubhpc.kernels.contact_pairs import AXIAL, normal_and_gap
+from rubhpc.kernels.contact_pairs import AXIAL, V, W, normal_and_gap
 from rubhpc.kernels.lemke import solve_lemke
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def _fitted(state: State, setup: Setup, clearance: float, softness: float = 0.0)
 
 
 def at_rest(setup: Setup, clearance: float) -> State:
-    """Return the shaft at rest under its constant loads, on stators that the sag reaches, without friction.
+    """Return the shaft at rest under its constant loads, on stators that it reaches, without friction.
 
     Clearance in m; stators carry the weight that rests on them, and the springs of a penalty give by it.
 
@@ -97,19 +97,21 @@ def at_rest(setup: Setup, clearance: float) -> State:
         The stators leave no room for the shaft, or do not hold it.
     """
     state = State.at_rest(setup.model)
-    if not setup.model.sag.any():
-        return state
     gap, _ = gaps(state.displacement, setup, clearance)
-    state = replace(state, contact_force=np.where(gap < 0.0, LEAST_FORCE, 0.0))
+    if not np.any(gap < 0.0):
+        return state
+    state = replace(state, contact_force=np.full(gap.size, LEAST_FORCE))  # some may be pushed onto others
     spring = setup.law.stiffness
     state, is_found = _fitted(state, setup, clearance, softness=1.0 / spring if spring else 0.0)
+    force = state.contact_force
+    state = replace(state, contact_force=np.where(force > LEAST_FORCE, force, 0.0))
     is_held = isinstance(setup, ModalSetup) or not state.contact_force.any()  # the former takes no others
     if not is_held:
         pressed = gaps(state.displacement, setup, clearance)[1][state.contact_force > 0.0].any(axis=0)
         is_held = not np.any(pressed & _unheld(setup.model))
     if not (is_found and is_held):
         raise InputError(
-            "initial: the loaded shaft finds no rest on the stators that it reaches; constrain them, or set "
+            "initial: the shaft finds no rest on the stators that it reaches; constrain them, or set "
             'from = "contact_free"'
         )
     return with_overlap(state, setup, clearance) if spring else state
@@ -128,6 +130,7 @@ def gaps(displacement: Floats, setup: Setup, clearance: float) -> tuple[Floats, 
     gap, gap_jacobian = np.zeros(len(degree)), np.zeros((len(degree), displacement.size))
     for i, (stator, rows) in enumerate(zip(model.stators, degree, strict=True)):
         at = np.where(rows >= 0, displacement[rows], 0.0)
+        at[[V, W]] -= stator.centre
         body = slice(model.stator_start[i], model.stator_start[i] + stator.body.n_dof)
         drawn = np.zeros(stator.body.n_dof)
         if stator.squared_slope is not None:

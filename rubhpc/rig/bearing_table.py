@@ -41,6 +41,8 @@ class BearingTable(Support):
     kyy, kyz, kzy, kzz, cyy, cyz, czy, czz : tuple of float, optional
         The first letter of the pair is the direction of the force, the second that of the motion. A seal may
         have a negative direct stiffness.
+    eccentricity_y, eccentricity_z : tuple of float, optional
+        Where the journal rests in the film under its static load, m; the coefficients hold about there.
     interpolation : {"cubic", "linear"}
         Monotone cubic (F. N. Fritsch, J. Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300-304), which passes
         through every value and overshoots none; or straight lines.
@@ -91,6 +93,18 @@ class BearingTable(Support):
     czy: tuple[float, ...] | None = series(
         "N s/m", doc="Horizontal force per vertical velocity.", example="[8e4, 3e4, 1e4]", default=None
     )
+    eccentricity_y: tuple[float, ...] | None = series(
+        "m",
+        doc="Vertical static position of the journal in the film, under the loads; up is positive.",
+        example="[-30e-6, -20e-6, -12e-6]",
+        default=None,
+    )
+    eccentricity_z: tuple[float, ...] | None = series(
+        "m",
+        doc="Horizontal static position, along +z; 0 where only the vertical one is given.",
+        example="[-15e-6, -18e-6, -16e-6]",
+        default=None,
+    )
     interpolation: str = choice(
         of=("cubic", "linear"),
         doc="Between the speeds: monotone cubic, or straight lines.",
@@ -112,14 +126,15 @@ class BearingTable(Support):
             )
         if any(after <= before for before, after in zip(self.speed, self.speed[1:], strict=False)):
             raise FieldError("speed", "the speeds do not rise; sort the table, each speed once")
+        for declared in fields(self):
+            values = getattr(self, declared.name)
+            if isinstance(values, tuple) and len(values) not in (1, len(self.speed)):
+                problem = f"{len(values)} values for {len(self.speed)} speeds"
+                raise FieldError(declared.name, f"{problem}; give one for each speed, or a single number")
         for one, letter in (("stiffness", "k"), ("damping", "c")):
             pairs = [f"{letter}{pair}" for pair in PAIRS]
-            for key in (one, *pairs):
-                values = getattr(self, key)
-                if values is not None and len(values) not in (1, len(self.speed)):
-                    problem = f"{len(values)} values for {len(self.speed)} speeds"
-                    raise FieldError(key, f"{problem}; give one for each speed, or a single number")
-                if key != one and values is not None and getattr(self, one) is not None:
+            for key in pairs:
+                if getattr(self, key) is not None and getattr(self, one) is not None:
                     raise FieldError(key, f"conflicts with {one}; give either {one} or {', '.join(pairs)}")
         if self.stiffness is None and (self.kyy is None or self.kzz is None):
             key = "kyy" if self.kyy is None else "kzz"
@@ -142,6 +157,20 @@ class BearingTable(Support):
         InputError
             Outside the table: nothing is extrapolated.
         """
+        values = self._values(spin, name)
+        return values[:4].reshape(2, 2), values[4:8].reshape(2, 2)
+
+    def eccentricity(self, spin: float, name: str = "bearing") -> NDArray[np.float64] | None:
+        """Return the static position of the journal at a spin, (2,), up and along +z, m; None if not given.
+
+        Parameters and errors are those of `at`.
+        """
+        if self.eccentricity_y is None and self.eccentricity_z is None:
+            return None
+        return self._values(spin, name)[8:]
+
+    def _values(self, spin: float, name: str) -> NDArray[np.float64]:
+        """What `_curves` returns at a spin within the table."""
         low, high = self.speed[0], self.speed[-1]
         if spin == 0.0:
             spin = low
@@ -151,12 +180,11 @@ class BearingTable(Support):
             rpm = 30 / math.pi
             problem = f"{spin * rpm:.6g} rpm is outside its table, {low * rpm:.6g} to {high * rpm:.6g} rpm"
             raise InputError(f"{name}: {problem}; extend the table, or stay within it")
-        values = self._curves(nearest)
-        return values[:4].reshape(2, 2), values[4:].reshape(2, 2)
+        return self._curves(nearest)
 
     @cached_property
     def _curves(self) -> Callable[[float], NDArray[np.float64]]:
-        """Coefficients kyy, kyz, kzy, kzz, cyy, ... over the spin, (8,)."""
+        """Coefficients kyy, kyz, kzy, kzz, cyy, ... and both eccentricities over the spin, (10,)."""
         from scipy.interpolate import PchipInterpolator, make_interp_spline  # few rigs need them
 
         columns = []
@@ -166,6 +194,8 @@ class BearingTable(Support):
                 if values is None:
                     values = common if common is not None and pair in ("yy", "zz") else (0.0,)
                 columns.append(np.broadcast_to(values, len(self.speed)))
+        for values in (self.eccentricity_y, self.eccentricity_z):
+            columns.append(np.broadcast_to(values or (0.0,), len(self.speed)))
         table = np.stack(columns, axis=1)
         if self.interpolation == "linear":
             curves: Callable[[float], NDArray[np.float64]] = make_interp_spline(self.speed, table, k=1)

@@ -35,6 +35,7 @@ class Load(Placed):
     )
 
 
+UNLOADED, STANDSTILL = "unloaded", "standstill"
 NodeForce: TypeAlias = Unbalance | Load
 
 
@@ -51,6 +52,23 @@ class RotorForces:
         default=0.0,
         at_least=0,
     )
+    clearance_from: float | str = quantity(
+        "rad/s",
+        doc="About which position of the shaft stators are set: without loads, or where the loads hold it at "
+        "standstill or at a speed.",
+        example='"standstill"',
+        default=UNLOADED,
+        at_least=0,
+        or_words=(UNLOADED, STANDSTILL),
+        added=True,
+    )
+
+    @property
+    def aligned_at(self) -> float | None:
+        """Speed, rad/s, of the shaft about which stators are set; None where it bears no loads."""
+        if isinstance(self.clearance_from, str):
+            return None if self.clearance_from == UNLOADED else 0.0
+        return self.clearance_from
 
     def node_forces(self) -> Iterator[tuple[str, NodeForce]]:
         """Yield every force at a node with its dotted key, "load.1"."""

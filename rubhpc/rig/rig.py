@@ -13,6 +13,7 @@ from rubhpc.input.quantity import parse_quantity
 from rubhpc.input.reading import plain
 from rubhpc.rig.carriers import AnyCarrier  # noqa: TC001 - annotations are read when a rig is built
 from rubhpc.rig.carrying import check_carriers
+from rubhpc.rig.forces import UNLOADED
 from rubhpc.rig.parts import FIXED_AT_NODE_1, Torsion
 from rubhpc.rig.ross import rotor_from_ross
 from rubhpc.rig.rotors import AnyRotor, MatrixRotor
@@ -62,6 +63,7 @@ class Rig:
         unbalance: Sequence[Unbalance] = (),
         load: Sequence[Load] = (),
         gravity: float | str = 0.0,
+        clearance_from: float | str = UNLOADED,
         output_node: int | None = None,
         displacement_limit: float = 100.0,
         name: str = "matrices",
@@ -86,6 +88,8 @@ class Rig:
             Constant forces.
         gravity : float (m/s2) or str with a unit
             Acts along -v on every mass of `M`; 0 by default.
+        clearance_from : float (rad/s) or str
+            About which position of the shaft stators are set: "unloaded", "standstill" or a speed.
         output_node : int, optional
             Node whose v, w and thx are recorded; default the first stator's.
         displacement_limit : float
@@ -113,6 +117,7 @@ class Rig:
             unbalance=_tuple(unbalance),
             load=_tuple(load),
             gravity=parse_quantity(gravity, "m/s^2", "gravity"),
+            clearance_from=parse_field(declared["clearance_from"], clearance_from, "clearance_from"),
             output_node=output_node,
             displacement_limit=displacement_limit,
         )
@@ -128,6 +133,7 @@ class Rig:
         unbalance: Sequence[Unbalance] = (),
         load: Sequence[Load] = (),
         gravity: float | str = 0.0,
+        clearance_from: float | str = UNLOADED,
         speed: float | str | None = None,
         torsion: Torsion = FIXED_AT_NODE_1,
         output_node: int | None = None,
@@ -154,6 +160,8 @@ class Rig:
             Constant forces at nodes from 1.
         gravity : float (m/s2) or str with a unit
             0 by default.
+        clearance_from : float (rad/s) or str
+            About which position of the shaft stators are set: "unloaded", "standstill" or a speed.
         speed : float (rad/s) or str with a unit, optional
             Speed at which speed-dependent bearings are evaluated once and for all. By default they keep
             their tables, and every case uses the coefficients at its own speed.
@@ -171,10 +179,14 @@ class Rig:
         """
         at = None if speed is None else parse_quantity(speed, "rad/s", "from_ross: speed")
         found = rotor_from_ross(rotor, speed=at, torsion=torsion, unbalance=_tuple(unbalance))
+        declared = {f.name: f for f in fields(MatrixRotor)}
         found = replace(
             found,
             load=_tuple(load),
             gravity=parse_quantity(gravity, "m/s^2", "from_ross: gravity"),
+            clearance_from=parse_field(
+                declared["clearance_from"], clearance_from, "from_ross: clearance_from"
+            ),
             output_node=output_node,
         )
         return cls(name=name, rotor=found, stator=_tuple(stators), carrier=_tuple(carriers))

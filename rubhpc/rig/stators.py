@@ -23,6 +23,7 @@ from rubhpc.input.fields import (
 )
 from rubhpc.rig.matrix_body import check_body, checked_matrices
 from rubhpc.rig.parts import MOST_ELEMENTS, UNDAMPED, Damping
+from rubhpc.units import typed_quantity
 
 LINEAR, SECOND_ORDER = "linear", "second_order"
 MOST_STATORS = 62  # a contact mode is numbered by the bits of an integer
@@ -264,6 +265,22 @@ AnyStator: TypeAlias = Stator | LumpedStator | MatrixStator
 def has_bent_stator(stators: tuple[AnyStator, ...]) -> bool:
     """Whether the gap of a stator knows that it bends."""
     return any(isinstance(stator, Stator) and stator.geometry == SECOND_ORDER for stator in stators)
+
+
+def gap_problem(stators: tuple[AnyStator, ...], clearance: float, *, is_ratio: bool = False) -> str:
+    """Return why a clearance (m) is none of these stators, and how to fix it; "" where it is one.
+
+    Stators that give may have an interference, but not by a share of an amplitude.
+    """
+    for stator in stators:
+        is_wall = isinstance(stator, LumpedStator) and stator.rigid
+        if clearance + stator.clearance_offset <= 0 and (is_wall or is_ratio):
+            gap, shift = (typed_quantity(size, "m") for size in (clearance, stator.clearance_offset))
+            problem = f"{gap} and a stator's clearance_offset of {shift} leave no gap"
+            if is_ratio:
+                return f"{problem}; give clearance instead"
+            return f"{problem} at a rigid stator; use a larger one, or give the stator mass and stiffness"
+    return ""
 
 
 def single_stators(stators: tuple[AnyStator, ...]) -> tuple[AnyStator, ...]:

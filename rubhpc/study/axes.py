@@ -33,7 +33,11 @@ class OwnAxes:
         example="[0.70, 0.85]",
         above=0,
     )
-    clearance: float = quantity("m", doc="Radial clearance at rest.", example='["84 um", "100 um"]', above=0)
+    clearance: float = quantity(
+        "m",
+        doc="Radial clearance; below 0 an interference with stators that give.",
+        example='["84 um", "100 um"]',
+    )
     friction: float = quantity("", doc="Coefficient of friction.", example="[0.1, 0.3, 0.5]", at_least=0)
 
 

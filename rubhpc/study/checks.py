@@ -10,6 +10,7 @@ from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.probes import with_probes
 from rubhpc.rig.reading import with_keys
+from rubhpc.rig.stators import gap_problem
 from rubhpc.schema import VARIABLES
 from rubhpc.study.axes import CLEARANCE_AXES, FROM_REST, NO_NEIGHBOURS, SPEED_AXES, Axis
 
@@ -95,8 +96,6 @@ def _check_rig(rig: Rig, axes: tuple[Axis, ...]) -> None:
         problem = f"{rig.name} has no unbalance, so no contact-free amplitude"
         raise InputError(f"[grid] clearance_ratio: {problem}; give clearance instead, or an unbalance")
     if "clearance" in by_name:
-        least = min(by_name["clearance"].tried)
-        offset = min(stator.clearance_offset for stator in rig.stator)
-        if least + offset <= 0:
-            problem = f"{least:g} m and a stator's clearance_offset of {offset:g} m leave no gap"
-            raise InputError(f"[grid] clearance: {problem}; give a larger clearance")
+        problem = gap_problem(rig.stator, min(by_name["clearance"].tried))
+        if problem:
+            raise InputError(f"[grid] clearance: {problem}")

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from rubhpc.errors import InputError
 from rubhpc.fem.constraints import find_rigid_body_mode, unheld_message
 from rubhpc.fem.response import check_response_node
+from rubhpc.rig.stators import gap_problem
 from rubhpc.study.initial import KNOCKED
-from rubhpc.units import typed_quantity
 
 if TYPE_CHECKING:
     from rubhpc.study.operating_points import OperatingPoints
@@ -35,14 +35,12 @@ def check_points(points: OperatingPoints) -> None:
 
 
 def check_gap(points: OperatingPoints, least: float) -> None:
-    """Refuse a least clearance, m, that a stator's own offset closes."""
+    """Refuse a least clearance, m, that stators cannot have."""
     varied = [i for i in points.rig_axes if points.study.axes[i].name.endswith("offset")]
-    offset = min(s.clearance_offset for at in points.along(varied) for s in points.rig(at).stator)
-    if least + offset <= 0:
-        gap, shift = typed_quantity(least, "m"), typed_quantity(offset, "m")
-        problem = f"{gap} and a stator's clearance_offset of {shift} leave no gap"
-        name = "clearance_ratio" if points.is_clearance_ratio else "clearance"
-        raise InputError(f"[grid] {name}: {problem}; use a larger one")
+    is_ratio = points.is_clearance_ratio
+    for at in points.along(varied):
+        if problem := gap_problem(points.rig(at).stator, least, is_ratio=is_ratio):
+            raise InputError(f"[grid] {'clearance_ratio' if is_ratio else 'clearance'}: {problem}")
 
 
 def _check_step(points: OperatingPoints, step: float) -> None:

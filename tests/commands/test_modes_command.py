@@ -204,3 +204,14 @@ def test_an_amplification_factor_that_is_not_known_is_explained():
     assert "AF nan: within the range" in run(
         "mokhtar2017", "--range", "1700 rpm", "1930 rpm", "--response", "8"
     )
+
+
+def test_a_sag_of_dynamic_coefficients_is_remarked_on_once(tmp_path):
+    rig = (PACKAGED / "mokhtar2017.toml").read_text()
+    rig = rig.replace("[[rotor.shaft]]", "[rotor]\ngravity = 9.81\n[[rotor.shaft]]", 1)
+    film = "[[rotor.bearing]]\nnode = 15\nspeed = [0.0, 500.0]\n"
+    rig = rig.replace("[[rotor.bearing]]\nnode = 15\n", film, 1)
+    for position, n_remark in (("", 1), ("eccentricity_y = -2e-5\n", 0)):
+        (tmp_path / "film.toml").write_text(rig.replace(film, film + position))
+        result = CliRunner().invoke(modes, [str(tmp_path / "film.toml"), "--speed", "100", "--speed", "200"])
+        assert result.stderr.count("warning: the sag under gravity and loads") == n_remark

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from trial_rig import trial_rig
 
-from rubhpc import InputError, assemble, simulate
+from rubhpc import InputError, assemble, run_up, simulate
 from rubhpc.fem.assemble import model_at
 from rubhpc.fem.modes import modes
 from rubhpc.fem.response import (
@@ -16,6 +16,7 @@ from rubhpc.fem.response import (
     steady_response,
     step_limit,
 )
+from rubhpc.fem.statics import sag_at, sag_remark
 from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.rig.parts import Bearing, Damping
 from rubhpc.study.cases import CaseGrid
@@ -116,3 +117,82 @@ def test_a_study_takes_each_case_at_its_speed():
 def test_a_study_beyond_the_table_is_refused():
     with pytest.raises(InputError, match=r"rotor.bearing.1: 3819.72 rpm is outside its table"):
         sweep([100.0, 400.0]).case((1, 0, 0))
+
+
+EAST, WEST = (-40e-6, -25e-6, -10e-6), (12e-6, 20e-6, 16e-6)
+FILM = replace(TABLE, eccentricity_y=EAST, eccentricity_z=WEST)
+
+
+def pinned(gravity=9.81):
+    """A rig on two films; in the right one the journal stays at (-20, 5) um."""
+    rig = rig_on(FILM, gravity)
+    right = replace(TABLE, node=5, eccentricity_y=-20e-6, eccentricity_z=5e-6)
+    return replace(rig, rotor=replace(rig.rotor, bearing=(FILM, right)))
+
+
+@pytest.mark.parametrize("spin", [80.0, 150.0, SPIN, 320.0])
+def test_journals_rest_where_their_table_has_them(spin):
+    """The shaft is the line through its journals, and bends about it as on pins."""
+    model = model_at(assemble(pinned()), spin)
+    left = FILM.eccentricity(spin)
+    assert [sag_at(model.rotor, model.sag, node) for node in (1, 5)] == [
+        pytest.approx(tuple(left), rel=1e-9),
+        pytest.approx((-20e-6, 5e-6), rel=1e-9),
+    ]
+    stiff = tuple(Bearing(node=node, stiffness=1e13) for node in (1, 5))
+    pins = assemble(replace(pinned(), rotor=replace(pinned().rotor, bearing=stiff)))
+    bent = sag_at(pins.rotor, pins.sag, 3)
+    line = 0.5 * (left + np.array([-20e-6, 5e-6]))
+    assert sag_at(model.rotor, model.sag, 3) == pytest.approx(tuple(line + bent), rel=1e-5)
+    assert model.sag == pytest.approx(
+        np.linalg.solve(model.rotor.stiffness, model.load + model.film), rel=1e-9
+    )
+
+
+@pytest.mark.parametrize("method", ["modal", "central-difference"])
+def test_probes_feel_the_weight_on_journals_in_films(method):
+    """At rest the shaft stays in its static position, and each journal bears half of the weight."""
+    probes = [{"name": f"at_{node}", "node": node, "quantity": "bearing_force"} for node in (1, 5)]
+    rig = replace(pinned(), rotor=replace(pinned().rotor, unbalance=()))
+    case = {"speed": SPIN, "clearance": "5 mm", "transient": 0, "revolutions": 1, "method": method}
+    record = simulate(rig, **case, probes=probes)
+    model = model_at(assemble(rig), SPIN)
+    up, across = sag_at(model.rotor, model.sag, 3)
+    assert record.vertical == pytest.approx(np.full(256, up), rel=1e-9)
+    assert record.horizontal == pytest.approx(np.full(256, across), rel=1e-9)
+    weight = model.load[[name == "v" for _, name in model.rotor.degrees]].sum()
+    for probe in (record.probe_at_1, record.probe_at_5):
+        assert probe == pytest.approx(np.full(256, 0.5 * weight), rel=1e-5)
+
+
+def test_a_run_up_follows_the_journals():
+    rig = replace(pinned(), rotor=replace(pinned().rotor, unbalance=()))
+    probe = {"name": "at_1", "node": 1, "quantity": "bearing_force"}
+    passage = run_up(rig, start=90.0, stop=300.0, time="4 s", clearance="5 mm", probes=[probe])
+    speeds, model = passage.speed.values, assemble(rig)
+    known = np.array([sag_at(model.rotor, model_at(model, speed).sag, 3) for speed in speeds])
+    for name, at in zip(("vertical", "horizontal"), known.T, strict=True):
+        mean = passage[name].values.reshape(len(speeds), -1).mean(axis=1)
+        assert mean == pytest.approx(at, abs=0.01 * np.ptp(at)), name
+    assert passage.probe_at_1.values == pytest.approx(passage.probe_at_1.values.mean(), rel=1e-3)
+
+
+def test_journals_of_tables_are_checked():
+    assert BearingTable(node=1, speed=SPEEDS, stiffness=1e6).eccentricity(SPIN) is None
+    assert FILM.eccentricity(0.0) == pytest.approx([EAST[0], WEST[0]])
+    assert replace(FILM, eccentricity_z=None).eccentricity(SPIN)[1] == 0.0
+    with pytest.raises(InputError, match="eccentricity_y: 2 values for 3 speeds; give one for each speed"):
+        replace(FILM, eccentricity_y=(0.0, 1e-5))
+    twice = replace(
+        pinned(), rotor=replace(pinned().rotor, bearing=(FILM, FILM, rig_on(TABLE).rotor.bearing[1]))
+    )
+    with pytest.raises(InputError, match=r"rotor\.bearing\.2: .* another table at node 1 gives the position"):
+        assemble(twice)
+
+
+def test_the_sag_of_dynamic_coefficients_is_remarked_on():
+    for rig in (rig_on(TABLE), rig_on(replace(frozen(SPIN).rotor.bearing[0]))):
+        assert "is that of the dynamic coefficients" in sag_remark(assemble(rig))
+    for rig in (rig_on(TABLE, gravity=0.0), pinned(), rig_on(Bearing(node=1, stiffness=1e6))):
+        assert sag_remark(assemble(rig)) == ""
+    assert [line for line in sweep([100.0, SPIN]).warnings() if "dynamic coefficients" in line]

@@ -18,7 +18,7 @@ from postproc.signals.cascade import below, cascade, hold_peaks, hold_rows
 from postproc.store.rig_of_case import natural_frequencies, stator_places
 from postproc.store.select import select
 from rubhpc.errors import InputError
-from rubhpc.rig.reading import read_rig
+from rubhpc.rig.reading import read_rig, with_keys
 from rubhpc.study.axis_reading import make_axis
 from rubhpc.study.study import Study
 
@@ -165,7 +165,7 @@ def test_natural_frequencies_follow_an_axis_of_the_rig(cases):
 
 
 def test_stators_stand_where_the_rig_says(cases):
-    assert stator_places(cases) == [(0.0, 0.0)]
+    assert stator_places(cases) == [(0.0, 0.0, 0.0, 0.0)]
 
 
 def test_stators_follow_the_axes_of_a_real_study(cases):
@@ -178,14 +178,21 @@ def test_stators_follow_the_axes_of_a_real_study(cases):
         output=Path("none.zarr"),
     )
     case = cases.assign_attrs(rig=rig.as_dict(), study=study.as_dict()).assign_coords(stator_1_angle=1.2)
-    assert stator_places(case) == [(1.2, 0.0)]
+    assert stator_places(case) == [(1.2, 0.0, 0.0, 0.0)]
+
+
+def test_stators_stand_about_the_shaft_that_they_are_set_about(cases):
+    keys = {"rotor.gravity": 9.81, "rotor.clearance_from": "standstill"}
+    rig = with_keys(read_rig("mokhtar2017"), keys)
+    ((_, _, across, up),) = stator_places(cases.assign_attrs(rig=rig.as_dict()))
+    assert (across, up) == (0.0, pytest.approx(-2.6855e-4, rel=1e-4))
 
 
 def test_a_stator_over_another_disc_is_not_at_this_one(cases):
     rig = read_rig("mokhtar2017").as_dict()
     rig["stator"] += [rig["stator"][0] | {"node": 4, "radius": 0.05, "angle": 1.0}]
     rig["stator"] += [rig["stator"][0] | {"angle": 2.0, "clearance_offset": 1e-5}]
-    assert stator_places(cases.assign_attrs(rig=rig)) == [(0.0, 0.0), (2.0, 1e-5)]
+    assert stator_places(cases.assign_attrs(rig=rig)) == [(0.0, 0.0, 0.0, 0.0), (2.0, 1e-5, 0.0, 0.0)]
 
 
 def test_a_store_without_a_rig_says_so():

@@ -171,7 +171,7 @@ CASES = [
         "tower of powers", _GAP, 'clearance = "9**9**9 m"', "[grid] clearance:", "not a number with a unit"
     ),
     _study("negative friction", _FRICTION, "friction = [0.1, -0.1]", "[grid] friction: -0.1", "at least 0"),
-    _study("no clearance left", _GAP, "clearance = 0.0", "[grid] clearance: 0 m", "above 0"),
+    _study("no share left", _GAP, "clearance_ratio = 0.0", "[grid] clearance_ratio: 0", "above 0"),
     _study("standstill", _SPEED, "speed_ratio = [0, 1]", "[grid] speed_ratio: 0 is not a valid speed"),
     _study(
         "range without stop", _SPEED, "speed_ratio = { start = 1, step = 1 }", "[grid] speed_ratio:", "stop"
@@ -356,9 +356,9 @@ CASES = [
         rig=_edited(RIG, 'mass = "8 g"', "mass = 0"),
     ),
     Malformed(
-        "offset closes the gap",
+        "offset closes the gap of a wall",
         ("study.toml", "[grid] clearance", "clearance_offset"),
-        study=_edited(STUDY, _GAP, 'clearance = "0.1 mm"'),
-        rig=_edited(RIG, "angle = 0.0", 'angle = 0.0\nclearance_offset = "-0.2 mm"'),
+        study=b'rig = "own.toml"\n[grid]\nspeed = 100\nclearance = "0.1 mm"\nfriction = 0.1',
+        rig=f'{RIG}\n[[stator]]\nnode = 8\nangle = 3\nrigid = true\nclearance_offset = "-0.2 mm"'.encode(),
     ),
 ]

@@ -120,12 +120,13 @@ class Orbit extends Plane {
   // The circle of the clearance, and the face of each stator, none without a gap; returns their corners.
   bench(gap, factor, places, reach) {
     const turn = gap > 0 ? Array.from({ length: 121 }, (_, i) => (i * Math.PI) / 60) : [];
-    this.circle.data = { z: turn.map((a) => gap * Math.sin(a)), y: turn.map((a) => gap * Math.cos(a)) };
+    const [, , z0 = 0, y0 = 0] = (places[0] ?? []).map((value) => value * factor); // about which they are set
+    this.circle.data = { z: turn.map((a) => z0 + gap * Math.sin(a)), y: turn.map((a) => y0 + gap * Math.cos(a)) };
     const halfAngle = Math.PI / Math.max(places.length, 3); // the stators of a ring do not overlap
     const faces = (gap > 0 ? places : []).map(([angle, offset]) => {
       const near = gap + offset * factor, far = near + 0.12 * reach, half = Math.min(0.22 * reach, 0.8 * near * Math.tan(halfAngle));
       const [s, c] = [Math.sin(angle), Math.cos(angle)];
-      const corner = (along, across) => [along * s + across * c, along * c - across * s];
+      const corner = (along, across) => [z0 + along * s + across * c, y0 + along * c - across * s];
       return [corner(near, -half), corner(near, half), corner(far, half), corner(far, -half)];
     });
     this.faces.data = { zs: faces.map((f) => f.map((p) => p[0])), ys: faces.map((f) => f.map((p) => p[1])) };

@@ -84,7 +84,7 @@ def _beside(branching: Branching, free: Sequence[Point]) -> tuple[Point, int, fl
         found = []
         for point in points:
             gap = _least_gaps(point)
-            clearance = point.case.bodies.clearance[: gap.size]
+            clearance = np.abs(point.case.bodies.clearance[: gap.size])
             pair = int(np.argmin(gap / clearance))
             if NEAR[0] * clearance[pair] < gap[pair] < NEAR[1] * clearance[pair]:
                 found.append((point, pair, float(gap[pair]), float(clearance[pair])))

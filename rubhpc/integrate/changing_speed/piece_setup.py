@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from rubhpc.fem.probes import probes_at, seen_at_rest
+from rubhpc.fem.statics import at_rest_under
 from rubhpc.integrate.changing_speed.followed_modes import between
 from rubhpc.integrate.changing_speed.retuned_curved import RetunedCurvedLibrary
 from rubhpc.integrate.changing_speed.retuned_laws import RetunedFrictionLibrary, RetunedPenaltyLibrary
@@ -150,15 +152,21 @@ class HeldMatrices:
     def sagging(self, torque: float, acceleration: float, speed: float) -> Model:
         """The model with the sag under a drive's torque, N m, at an acceleration and a speed, rad/s."""
         models = self.sagging_models or [self.model]
-        within = self.within(speed) if self.sagging_models else 0.0
+        is_moving = self.sagging_models or self.model.film is not None
+        within = self.within(speed) if is_moving else 0.0
         asked = torque, acceleration, within
         if self._latest is None or self._latest[0] != asked:
-            sag, rows = models[0].sag, models[0].probe_rows[0]
-            if within:
+            sag, film, rows = models[0].sag, models[0].film, models[0].probe_rows[0]
+            if within and film is None:
                 sag = between([model.sag for model in models], within)
                 rows = between([model.probe_rows[0] for model in models], within)
+            elif within:  # positions of journals may bend where no matrix does
+                known = self.model.rotor.tabulated_speeds
+                at, before = np.clip([speed, self.reduced.spin], known[0], known[-1]).tolist()
+                sag, film = at_rest_under(self.model.rotor.at(at), self.model.load, at)
+                rows = probes_at(self.model, at, before).probe_rows[0]
             sag = sag + torque * self.twist + acceleration * self.lean
-            self._latest = asked, sagging(self.model, sag, rows)
+            self._latest = asked, sagging(self.model, sag, film, rows)
         return self._latest[1]
 
     def tuned(
@@ -263,7 +271,7 @@ class PieceSetup(ModalSetup):
         """Overlap, m, that modes which follow the speed may leave as a pair opens, without an event."""
         if not self.held.is_followed or made.spring:
             return made.overlap
-        return float(self.accuracy * clearance[: len(self.model.stators)].min())
+        return max(made.overlap, float(self.accuracy * np.abs(clearance[: len(self.model.stators)]).min()))
 
     def library(self, friction: float) -> ModeLibrary:
         """Contact modes of a friction, valid until another piece requests them."""
@@ -314,9 +322,10 @@ def with_values(instance: D, **values: Any) -> D:
     return other
 
 
-def sagging(model: Model, sag: Floats, rows: Floats | None = None) -> Model:
+def sagging(model: Model, sag: Floats, film: Floats | None, rows: Floats | None = None) -> Model:
     """A model about another sag of its rotor, (n_rotor_dof,); `rows` are what probes see of displacements."""
+    model = replace(model, sag=sag, film=film)
     if model.probe is not None:
-        constant = (model.probe_rows[0] if rows is None else rows)[:, : sag.size] @ sag
+        constant = seen_at_rest(model, model.probe.probes, model.probe_rows[0] if rows is None else rows)
         model = replace(model, probe=replace(model.probe, constant=constant))
-    return replace(model, sag=sag)
+    return model

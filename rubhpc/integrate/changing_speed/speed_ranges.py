@@ -10,7 +10,7 @@ import numpy as np
 
 from rubhpc.fem.free_spin import unit_rotation
 from rubhpc.fem.probes import probes_at
-from rubhpc.fem.statics import sag_under
+from rubhpc.fem.statics import at_rest_under, sag_under
 from rubhpc.integrate.changing_speed.followed_modes import NODES
 from rubhpc.integrate.changing_speed.followed_range import followed_reach, rotor_of
 from rubhpc.integrate.changing_speed.held_matrices import (
@@ -158,7 +158,7 @@ class SpeedRanges:
         """The model at a speed about its sag, and reduced, with spin and unbalance force of another speed."""
         fastest = self._fastest
         model, damping, stiffness = self._matrices(speed, acceleration, slope)
-        model = sagging(model, sag_under(model.rotor, model.load))
+        model = sagging(model, *at_rest_under(model.rotor, model.load, self._tabulated(speed)))
         phasor = self.phasor * of_force**2
         reduced = replace(
             fastest.reduced,

@@ -24,6 +24,7 @@ from rubhpc.integrate.reduced_model.truncation import Touch, kept_modes, touch_o
 from rubhpc.integrate.scheme import Scheme
 from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import with_keys
+from rubhpc.rig.stators import gap_problem
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -141,10 +142,8 @@ class Family:
         if clearance is None:
             assert case.clearance_ratio is not None
             clearance = case.clearance_ratio * contact_free_amplitude(model, spin)
-        for stator in model.stators:
-            if clearance + stator.clearance_offset <= 0:
-                problem = f"{clearance:g} m and a stator's clearance_offset leave no gap"
-                raise InputError(f"{self.along}: {value:g}: {problem}; use a range without it")
+        if problem := gap_problem(case.rig.stator, clearance, is_ratio=case.clearance is None):
+            raise InputError(f"{self.along}: {value:g}: {problem}")
         return self._setup(case, model, spin, is_measured), clearance, case.friction
 
     def carry(self, motion: Floats, before: PiecewiseMotion, after: PiecewiseMotion) -> Floats:

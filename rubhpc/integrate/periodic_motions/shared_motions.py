@@ -98,7 +98,7 @@ def _add(
 def _starts(setup: ModalSetup, clearance: float) -> Iterator[State]:
     """The fixed starts that the rig allows."""
     least = clearance + min(stator.clearance_offset for stator in setup.model.stators)
-    unit = abs(setup.spin) * max(least, 0.0)
+    unit = abs(setup.spin * least)
     based: list[str] = []
     for word in (CONTACT_FREE, REST):
         try:
