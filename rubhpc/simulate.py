@@ -63,7 +63,8 @@ def simulate(
     speed_ratio : float, optional
         Rotation speed over the rotor's first lateral frequency at standstill.
     clearance : float (m) or str with a unit, optional
-        Radial clearance; either this or `clearance_ratio`.
+        Radial clearance, or below 0 an interference with stators that give; either this or
+        `clearance_ratio`.
     clearance_ratio : float, optional
         Radial clearance over the contact-free amplitude at that speed.
     friction : float

@@ -256,9 +256,7 @@ class Model:
     load: NDArray[np.float64]  # (n_dof,), constant loads on the rotor, N or N m
     carriers: tuple[CarrierModel, ...] = ()
     probe: ProbeRows | None = None
-    film: NDArray[np.float64] | None = (
-        None  # (n_dof,), N: what holds journals beyond `K sag = load`, if given
-    )
+    film: NDArray[np.float64] | None = None  # (n_dof,), N, where tables place journals: K sag = load + film
 
     @cached_property
     def bodies(self) -> tuple[Body, ...]:

@@ -208,6 +208,8 @@ def _number(declared: Field[Any], value: object, where: str) -> float:
     """A value of a file as an axis holds it: of a word its place among the choices."""
     parsed = parse_field(declared, value, where)
     if declared.metadata["kind"] != "choice":
+        if isinstance(parsed, str):
+            raise InputError(f"{where}: {brief(parsed)} is a word; an axis has numbers, override takes words")
         return float(parsed)
     if problem := check_value(declared, parsed):
         raise InputError(f"{where}: {problem}")

@@ -11,6 +11,7 @@ from rubhpc.fem.assemble import model_at
 from rubhpc.fem.statics import sag_at
 from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.rig.reading import rig_from_dict, with_keys
+from rubhpc.study.axis_reading import make_axis
 
 RPM = math.pi / 30
 SHAFT, BEAM = 143343.35, 3e9 * 25e-6 / 0.04  # N/m, of the disc and of a stator of the packaged rig
@@ -111,6 +112,9 @@ def test_where_stators_are_set_is_written_and_read():
         assert rig_from_dict(rig.as_dict()).rotor.clearance_from == rig.rotor.clearance_from
     with pytest.raises(InputError, match=r'"running" is not a number .*, or "unloaded", "standstill"'):
         with_keys(RING, {"rotor.clearance_from": "running"})
+    assert make_axis("rotor.clearance_from", ["0 rpm", "60 rpm"], RING).values == (0.0, 2 * math.pi)
+    with pytest.raises(InputError, match=r'clearance_from: "standstill" is a word; an axis has numbers'):
+        make_axis("rotor.clearance_from", "standstill", RING)
     given = {"degrees": [(1, "v")], "stators": LumpedStator(node=1, rigid=True, radius=1.0), "gravity": 9.81}
     lying = Rig.from_matrices([[2.0]], K=[[1e5]], **given, clearance_from="standstill")
     assert assemble(lying).stators[0].centre == (-2.0 * 9.81 / 1e5, 0.0)
