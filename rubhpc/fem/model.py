@@ -63,18 +63,27 @@ class SpeedDependence:
         return stiffness, damping
 
     def journals_at(self, spin: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the degrees of journals that are placed at a spin, rad/s, (n, n_dof), and where, (n,), m."""
-        found = {}
+        """Return the motion of journals that are placed at a spin, rad/s, (n, n_dof), and where, (n,), m.
+
+        A journal is placed relative to what its bearing stands on.
+        """
+        found: dict[int, float] = {}
+        motions = []
         for support in self.supports:
             eccentricity = support.table.eccentricity(spin, support.name)
-            for i, row in enumerate(support.rows):
+            for i, (row, far) in enumerate(zip(support.rows, support.far, strict=True)):
                 if eccentricity is None or row < 0:
                     continue
                 if row in found:
-                    problem = f"another table at node {support.table.node} gives the position of the journal"
+                    problem = f"another table at node {support.node} gives the position of the journal"
                     raise InputError(f"{support.name}: eccentricity_y: {problem}; remove one of them")
                 found[row] = eccentricity[i]
-        return np.eye(len(self.stiffness))[list(found)], np.array(list(found.values()))
+                motion = np.zeros(len(self.stiffness))
+                motion[row] = 1.0
+                if far >= 0:
+                    motion[far] = -1.0
+                motions.append(motion)
+        return np.reshape(motions, (-1, len(self.stiffness))), np.array(list(found.values()))
 
 
 def couple(

@@ -59,8 +59,10 @@ def with_probes(model: Model, rig: Rig, probes: Sequence[Probe], spin: float) ->
 def seen_at_rest(model: Model, probes: Sequence[Probe], rows: Floats) -> Floats:
     """Return what probes see of the sag, (n_probe,), from their factors of displacements (n_probe, n_all)."""
     constant: Floats = rows[:, : model.rotor.n_dof] @ model.sag
+    by_speed = model.rotor.by_speed
+    journals = {support.node for support in by_speed.supports} if by_speed is not None else set()
     for i, probe in enumerate(probes):
-        if model.film is not None and probe.quantity == "bearing_force":
+        if model.film is not None and probe.quantity == "bearing_force" and probe.node in journals:
             assert probe.node is not None
             up, aside = sag_at(model.rotor, model.film, probe.node)
             constant[i] -= math.cos(probe.angle) * up + math.sin(probe.angle) * aside

@@ -19,6 +19,7 @@ from rubhpc.fem.response import (
 from rubhpc.fem.statics import sag_at, sag_remark
 from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.rig.parts import Bearing, Damping
+from rubhpc.rig.reading import rig_from_dict
 from rubhpc.study.cases import CaseGrid
 from rubhpc.study.study import Study, make_axis
 
@@ -196,3 +197,24 @@ def test_the_sag_of_dynamic_coefficients_is_remarked_on():
     for rig in (rig_on(TABLE, gravity=0.0), pinned(), rig_on(Bearing(node=1, stiffness=1e6))):
         assert sag_remark(assemble(rig)) == ""
     assert [line for line in sweep([100.0, SPIN]).warnings() if "dynamic coefficients" in line]
+
+
+def test_a_journal_is_placed_relative_to_its_pedestal():
+    film = {
+        "speed": [10.0, 900.0],
+        "stiffness": [1e7, 1e7],
+        "eccentricity_y": [-2e-5] * 2,
+        "eccentricity_z": [1e-5] * 2,
+    }
+    shaft = {"length": 1.0, "outer_diameter": 0.05, "elements": 2, "density": 7800.0}
+    shaft |= {"youngs_modulus": 2.1e11, "shear_modulus": 8e10}
+    rotor = {"gravity": 9.81, "shaft": [shaft], "torsion": {"fixed_node": 1}}
+    seen = []
+    for pedestal in ({}, {"pedestal": {"stiffness": 1e7, "mass": 1.0}}):
+        rotor["bearing"] = [{"node": node, **film, **pedestal} for node in (1, 3)]
+        rig = rig_from_dict({"name": "journals", "rotor": rotor, "stator": []}, "journals")
+        model = model_at(assemble(rig), 300.0)
+        seen.append(sag_at(model.rotor, model.sag, 1))
+    weight = 7800.0 * np.pi / 4 * 0.05**2 * 9.81
+    assert seen[0] == pytest.approx((-2e-5, 1e-5))
+    assert seen[1] == pytest.approx((-2e-5 - weight / 2 / 1e7, 1e-5), rel=1e-6)
