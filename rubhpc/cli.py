@@ -6,6 +6,7 @@ Nothing heavy is imported before a command needs it: `rubhpc --help` names all c
 from __future__ import annotations
 
 import difflib
+import logging
 import os
 import sys
 import time
@@ -16,7 +17,7 @@ import click
 from postproc.catalogue import figures
 from rubhpc import __version__
 from rubhpc.children import SAFE_PATH
-from rubhpc.errors import RubError, StoppedEarly, printable
+from rubhpc.errors import RubError, StoppedEarly, StoreError, printable
 from rubhpc.frames import with_room
 from rubhpc.running.launch import FIRST_SPEAKS, launch, leave
 from rubhpc.streams import lasting_streams
@@ -107,6 +108,7 @@ def main(args: list[str] | None = None) -> None:
     """Run the command line and exit with its code."""
     for name in (*VARIABLES, SAFE_PATH):
         os.environ[name] = "1"
+    logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # it tells of reads that an error has cut short
     given = sys.argv[1:] if args is None else args
     with lasting_streams() as problem:
         code = _code_of(given)
@@ -132,7 +134,14 @@ def _code_of(args: list[str]) -> int:
         from rubhpc.running.crash import crash
 
         crashed = crash(error)
+        if isinstance(error, Exception) and _evaluates_store(args):
+            return _report(f"{crashed}, unless rubhpc verify finds damage", StoreError.exit_code)
         return _report(str(crashed), crashed.exit_code)
+
+
+def _evaluates_store(args: list[str]) -> bool:
+    """Whether a command draws or writes what a store says, which may come from anybody and say anything."""
+    return not {"reduce", "report", "view", "export", *figures()}.isdisjoint(args[:1])
 
 
 def _prints_results(args: list[str]) -> bool:

@@ -17,7 +17,6 @@ import numpy as np
 import xarray as xr
 import zarr
 
-from postproc.cases.workers import FAST_DECODING
 from postproc.cases.workers import computed as computed
 from postproc.signals.spectra import spectrum_of, with_frequency
 from postproc.store.axes import axes_of, find_axis, source
@@ -50,12 +49,10 @@ def open_in_pieces(path: str | Path, n_byte: float | None = None) -> xr.Dataset:
     if n_byte is None:
         n_byte = min(max(_MEMORY / (4 * (os.cpu_count() or 1)), _SMALLEST), _LARGEST)
     store = open_store(path)
-    files = RegularFiles(path)
-    is_fast = FAST_DECODING and not files.has_waiting_blocks  # it reads files by itself
-    with warnings.catch_warnings(), zarr.config.set(FAST_DECODING if is_fast else CHECKED):
+    with warnings.catch_warnings(), zarr.config.set(CHECKED):
         warnings.simplefilter("ignore", RuntimeWarning)  # as in `open_store`
         bare = xr.open_zarr(
-            path if is_fast else files,
+            RegularFiles(path),
             chunks=None,
             zarr_format=3,
             decode_times=False,
@@ -63,7 +60,8 @@ def open_in_pieces(path: str | Path, n_byte: float | None = None) -> xr.Dataset:
         )
     pieces: dict[str, xr.DataArray] = {}
     for name in map(str, store.data_vars):
-        if role_of(name) in LONG_ROLES:
+        # Those of branches and run-ups, in another form than stored, are few.
+        if role_of(name) in LONG_ROLES and name in bare and bare[name].dims == store[name].dims:
             pieces[name] = bare[name].chunk(_piece(store[name], axes_of(store), n_byte))
     found: xr.Dataset = store.assign(pieces)
     found.encoding = store.encoding

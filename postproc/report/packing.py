@@ -25,7 +25,8 @@ def pack_floats(values: ArrayLike) -> bytes:
 
     Bytes of equal weight lie together, as zarr's shuffle has them, so that what is alike compresses.
     """
-    bits = np.ascontiguousarray(values, dtype="<f4").ravel().view("<u4")
+    with np.errstate(over="ignore"):  # infinite then
+        bits = np.ascontiguousarray(values, dtype="<f4").ravel().view("<u4")
     # Rounding the significand of the largest NaN would make it a zero.
     rounded = np.where(bits & 0x7FFFFFFF > 0x7F800000, 0x7FC00000, bits + 0x400 & 0xFFFFF800).astype("<u4")
     return zlib.compress(rounded.view(np.uint8).reshape(-1, 4).T.tobytes(), 6)

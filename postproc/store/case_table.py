@@ -63,7 +63,7 @@ def case_table(store: xr.Dataset, names: Sequence[str] = ()) -> xr.Dataset:
             for i in range(store.sizes["stator"]):
                 each[f"{name}_stator_{int(store['stator'][i])}"] = store[name].isel(stator=i)
     wanted |= each
-    in_order = [*axes, *(n for n in wanted if n not in axes)]
+    in_order = dict.fromkeys(n for n in (*axes, *wanted) if n in wanted)  # points are no coordinate
     shape = store["status"]
     columns = {}
     for name in in_order:

@@ -42,16 +42,18 @@ def open_store(path: str | Path) -> xr.Dataset:
     if not path.exists():
         raise StoreError(f"{path}: no such store; give the directory that a study was run into")
     try:
-        arrays = _open(path, chunks={})
-        long = [str(n) for n in arrays.data_vars if role_of(str(n)) in SIGNAL_ROLES]
-        measures = _open(path, chunks="auto", without=long)
-        arrays = arrays[long]
+        return _opened(path)
     except StoreError:
         raise
     except Exception as error:  # zarr and xarray raise a dozen kinds for a directory that is not a store
         reason = str(error).partition("\n")[0]
         raise StoreError(f"{path}: cannot be read as a zarr store ({reason}); check the path") from error
-    store: xr.Dataset = measures.assign(arrays.data_vars)
+
+
+def _opened(path: Path) -> xr.Dataset:
+    arrays = _open(path, chunks={})
+    long = [str(n) for n in arrays.data_vars if role_of(str(n)) in SIGNAL_ROLES]
+    store: xr.Dataset = _open(path, chunks="auto", without=long).assign(arrays[long].data_vars)
     store = store[
         [*(n for n in VARIABLES if n in store.data_vars), *(n for n in store.data_vars if n not in VARIABLES)]
     ]

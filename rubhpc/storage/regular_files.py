@@ -47,11 +47,6 @@ class RegularFiles(ArrayFiles):
                 for v in manifest.variables
             }
 
-    @property
-    def has_waiting_blocks(self) -> bool:
-        """Whether blocks are waiting to be packed, which no other reader sees."""
-        return self._blocks is not None and self._blocks.folder.is_dir()
-
     async def get(
         self,
         key: str,
@@ -68,7 +63,7 @@ class RegularFiles(ArrayFiles):
         name, _, place = key.partition("/c.")
         if place and name in self._variables:
             is_address = isinstance(byte_range, RangeByteRequest) and byte_range.start >> _ADDRESS
-            if is_address or self.has_waiting_blocks:
+            if is_address or (self._blocks is not None and self._blocks.folder.is_dir()):
                 data = await asyncio.to_thread(self._shard, self._variables[name], place, byte_range)
                 prototype = prototype or default_buffer_prototype()
                 return None if data is None else prototype.buffer.from_bytes(data)
