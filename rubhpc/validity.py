@@ -9,7 +9,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-STEADY_SLIP = "minimum_slip_speed"  # its monitor holds for steady sliding: under Coulomb's law slip may reverse
+STEADY_SLIP = (
+    "minimum_slip_speed"  # its monitor holds for steady sliding: under Coulomb's law slip may reverse
+)
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,5 @@ def words(code: int) -> str:
 
 def counted(codes: NDArray[np.integer[Any]]) -> str:
     """Names of the monitors in any of these sums of bits, each with the number of sums that have it."""
-    counts = (
-        (monitor.name, int(((codes >> i) & 1).sum())) for i, monitor in enumerate(MONITORS.values())
-    )
+    counts = ((monitor.name, int(((codes >> i) & 1).sum())) for i, monitor in enumerate(MONITORS.values()))
     return ", ".join(f"{name} ({n})" for name, n in counts if n)

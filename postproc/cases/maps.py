@@ -14,9 +14,9 @@ from postproc.store.select import narrow
 from postproc.store.units import meanings
 from postproc.store.variables import require_variables
 from rubhpc.errors import InputError
-from rubhpc.schema import HAS_VALUES, VARIABLES, role_of
+from rubhpc.schema import HAS_VALUES, REGIME, SETTLED, VARIABLES, role_of
 from rubhpc.study.axes import SPEED_AXES, coordinate_of
-from rubhpc.validity import MONITORS, STEADY_SLIP, counted
+from rubhpc.validity import MONITORS, STEADY_SLIP, counted, words
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -170,3 +170,25 @@ def out_of_range(data: xr.Dataset) -> tuple[str, bool]:
     n, n_all = np.count_nonzero(validity), np.count_nonzero(has_values)
     count = f"all {n} cases" if n == n_all else f"{n} of {n_all} cases"
     return f"out of range in {count}: {counted(validity)}", bool(n > 0.5 * n_all)
+
+
+def verdict_of(cases: xr.Dataset) -> tuple[str, ...]:
+    """Return what a caption says of a single case that is done; nothing of several cases.
+
+    That is its regime or period, whether it had not settled, and the monitors that are out of range.
+    """
+    if "status" not in cases or any(cases.sizes[axis] != 1 for axis in axes_of(cases)):
+        return ()
+    names = [n for n in ("status", "regime", "period", "settled", *MONITORS) if n in cases]
+    case = cases[names].isel(dict.fromkeys(axes_of(cases), 0)).load()
+    if int(case["status"]) not in HAS_VALUES:
+        return ()
+    found = []
+    regime, period = (int(case[n]) if n in case else -1 for n in ("regime", "period"))
+    if regime >= 0:
+        word = REGIME[regime].replace("quasi_", "quasi-").replace("_", " ")
+        found.append(f"period {period}" if period > 0 and REGIME[regime] == "periodic" else word)
+    if "settled" in case and int(case["settled"]) == SETTLED.index("not_settled"):
+        found.append("not settled")
+    code = int(validity(case))
+    return (*found, *(f"out of range: {words(code)}".split(", ") if code else ()))

@@ -77,12 +77,15 @@ def decay_message(cases: Iterable[tuple[Model, float]]) -> str:
                 lasts *= abs(spin) / (2.0 * math.pi)
             if lasts <= slowest:
                 continue
-            slowest, unit = lasts, "revolutions" if spin else "s"
+            slowest, unit = lasts, "revolutions" if spin else "seconds"
             at = f"at {abs(spin) * 30.0 / math.pi:.6g} rpm " if spin else ""
-            n = f"{math.ceil(lasts)} revolutions: set transient = {math.ceil(lasts)}" if spin else f"{lasts:.3g} s"
+            needed = (
+                f"{math.ceil(lasts)}, which needs transient = {math.ceil(lasts)}" if spin else f"{lasts:.3g}"
+            )
             text = (
-                f"{at}the {mode.kind} mode of {mode.frequency:.4g} Hz of {name}, damping {mode.damping_ratio:.2g}, "
-                f"decays slowest: by half in {lasts * math.log(2.0) / LEFT:.3g} {unit}, to 1 % in {n}"
+                f"{at}the {mode.kind} mode of {mode.frequency:.4g} Hz of {name}, damping "
+                f"{mode.damping_ratio:.2g}, decays slowest: by half in {lasts * math.log(2.0) / LEFT:.3g} "
+                f"{unit}, to 1 % in {needed}"
             )
     return text
 

@@ -48,12 +48,14 @@ def with_probes(model: Model, rig: Rig, probes: Sequence[Probe], spin: float) ->
         for number, bearing in enumerate(rig.rotor.bearing, 1)
         if bearing.clearance is not None
     ]
-    known = ProbeRows(probes=(), rows=np.zeros(0), constant=np.zeros(0)) if model.probe is None else model.probe
+    known = (
+        ProbeRows(probes=(), rows=np.zeros(0), constant=np.zeros(0)) if model.probe is None else model.probe
+    )
     clearances = tuple(clearance for _, clearance in bearings)
     is_known = known.probes == probes and known.nodes == nodes and known.clearances == clearances
     if is_known and model.rotor.by_speed is None:  # as it is, with what has been derived from it
         return model
-    places = [(node, None) for node in nodes]
+    places: list[tuple[int, int | None]] = [(node, None) for node in nodes]
     places += [(rig.rotor.node_of(rig.rotor.bearing[k - 1]), rig.rotor.stands_on(k)) for k, _ in bearings]
     if not probes and not places:
         return replace(model, probe=None)
@@ -61,14 +63,17 @@ def with_probes(model: Model, rig: Rig, probes: Sequence[Probe], spin: float) ->
     for i, (node, far) in enumerate(places):
         for k, name in enumerate(("v", "w"), start=len(probes) + 2 * i):
             here, there = model.rotor.index(node, name), model.rotor.index(far or 0, name)
-            _add_force(rows[DISPLACEMENT, k], [1.0], [here], [there])
+            _add_force(rows[DISPLACEMENT, k], np.ones(1), [here], [there])
     for i, probe in enumerate(probes):
         try:
             _fill(rows[:, i], probe, model, rig, spin)
         except InputError as error:
             raise InputError(f"[record] probe {probe.name}: {error}") from None
     constant = rows[DISPLACEMENT][:, : model.rotor.n_dof] @ model.sag
-    return replace(model, probe=ProbeRows(probes=probes, rows=rows, constant=constant, nodes=nodes, clearances=clearances))
+    return replace(
+        model,
+        probe=ProbeRows(probes=probes, rows=rows, constant=constant, nodes=nodes, clearances=clearances),
+    )
 
 
 def probes_at(model: Model, spin: float, before: float) -> Model:

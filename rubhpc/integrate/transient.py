@@ -28,10 +28,10 @@ DECAYED = 0.01  # of the largest past value of a signal: reference for smaller o
 def pass_transient(march: March, recording: Recording) -> tuple[str | None, int]:
     """March through the transient, until the motion has settled where `recording` says "auto".
 
-    It has settled when no displacement of output node, tips or carriers, twist, rate of the twist or probe
-    differs from that 8 or 12 revolutions before by more than `settled_within` of the signal's largest value in
-    the cycle, or of a hundredth of its largest past value, so that a decaying signal settles too. The transient ends after `longest_transient`
-    revolutions at the latest.
+    It has settled when no displacement of output node, tips or carriers, no twist, rate of the twist or probe
+    differs from that 8 or 12 revolutions before by more than `settled_within` of the signal's largest value
+    in the cycle, or of a hundredth of its largest past value, so that a decaying signal settles too. The
+    transient ends after `longest_transient` revolutions at the latest.
 
     Returns
     -------

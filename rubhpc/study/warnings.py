@@ -47,7 +47,9 @@ def decay_of(points: OperatingPoints) -> str:
     text, recording = decay_message(found), study.recording
     if not text or recording.is_transient_direct:
         return text
-    return f"{text}; the study discards {'at most ' * recording.is_transient_auto}{recording.longest_transient}"
+    return (
+        f"{text}; the study discards {'at most ' * recording.is_transient_auto}{recording.longest_transient}"
+    )
 
 
 def _instability(points: OperatingPoints) -> str:
@@ -98,9 +100,7 @@ def _sag(points: OperatingPoints) -> str:
 
 def _undamped(points: OperatingPoints) -> str:
     """Modes that nothing damps, of the first rig that has such, and how many rigs do."""
-    found = [
-        undamped_message(assemble(points.rig(at)), points.response(at)[0]) for at in _some_rigs(points)
-    ]
+    found = [undamped_message(assemble(points.rig(at)), points.response(at)[0]) for at in _some_rigs(points)]
     named = [text for text in found if text]
     if not named:
         return ""

@@ -139,7 +139,9 @@ def _others(
     radius = model.stators[0].radius
     orbit = math.sqrt(float(signals["vertical"].var() + signals["horizontal"].var()))
     of_motion = dict(zip(MOTIONS, orbit * spin ** np.arange(3), strict=True))
-    of_twist = dict(zip(TWISTS, orbit / radius * spin ** np.arange(3) if radius > 0.0 else np.zeros(3), strict=True))
+    of_twist = dict(
+        zip(TWISTS, orbit / radius * spin ** np.arange(3) if radius > 0.0 else np.zeros(3), strict=True)
+    )
     scale = of_motion | of_twist
     rate = np.gradient(signals["torsion"]) * (spin * samples_per_revolution / (2.0 * np.pi))
     heard_of = [

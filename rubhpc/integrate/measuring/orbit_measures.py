@@ -46,7 +46,7 @@ def period(vertical: Floats, horizontal: Floats, samples_per_revolution: int) ->
 
 
 def ends_change(cycles: Floats, period: int) -> Floats:
-    """Root mean square distance of the first cycles from the last ones a whole number of periods later, (...).
+    """Root mean square distance of the first cycles from the last ones whole periods later, (...).
 
     Parameters
     ----------

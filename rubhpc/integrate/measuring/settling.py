@@ -67,16 +67,16 @@ def settled(
     if n_revolution >= LEAST_REVOLUTIONS:
         shift, deviation = halves(impulse.T)
         least = MOST_CHANGE * float(impulse.mean(axis=1).sum())
-        flags.append(int(shift <= max(MOST_SHIFT * _typical(deviation), least)))
+        flags.append(int(float(shift) <= max(MOST_SHIFT * float(_typical(deviation)), least)))
     return next((flag for flag in (int(False), UNKNOWN) if flag in flags), int(True))
 
 
 def heard(signals: Floats, samples_per_revolution: int, least: float, *, jumps: bool = False) -> Floats:
     """What `settled` compares of other signals in each revolution, (n, n_revolution, n_value).
 
-    Those that vary by less than `least`, or by less than 1e-4 of their largest value, are left out. Of signals
-    that jump, where a contact begins a sample later, it is the mean and the standard deviation of each
-    revolution.
+    Those that vary by less than `least`, or by less than 1e-4 of their largest value, are left out. Of
+    signals that jump, which differ in a whole sample where a contact begins a little later, it is the mean
+    and the standard deviation of each revolution.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def heard(signals: Floats, samples_per_revolution: int, least: float, *, jumps: 
     most = np.abs(signals).max(axis=1, initial=0.0)
     audible = signals[signals.std(axis=1) > np.maximum(least, NEGLIGIBLE * most)]
     n_revolution = signals.shape[1] // samples_per_revolution
-    cycles = audible.reshape(len(audible), n_revolution, samples_per_revolution)
+    cycles: Floats = audible.reshape(len(audible), n_revolution, samples_per_revolution)
     if jumps:
         return np.stack([cycles.mean(axis=2), cycles.std(axis=2)], axis=2)
     return cycles / math.sqrt(samples_per_revolution)
