@@ -148,7 +148,9 @@ def unused_monitors(case: xr.Dataset) -> set[str]:
         "force_over_euler_load": any(isinstance(stator, Stator) for stator in rig.stator),
         "tip_deflection_ratio": any(isinstance(stator, Stator) for stator in rig.stator),
         "force_over_strength": any(stator.strength is not None for stator in rig.stator),
-        "bearing_clearance_ratio": any(bearing.clearance is not None for bearing in rig.rotor.bearing),
+        "bearing_clearance_ratio": any(
+            bearing.clearance is not None for bearing in getattr(rig.rotor, "bearing", ())
+        ),
     }
     return {name for name, used in is_used.items() if not used}
 

@@ -162,8 +162,8 @@ def plain_number(value: float, digits: int = 4) -> str:
 def caption(data: xr.DataArray | xr.Dataset, further: Iterable[str] = ()) -> str:
     """Return what holds for all of `data`, in lines that fit a column.
 
-    That is its scalar coordinates, the places of its signals (their attribute `place`), what the ratios among
-    its coordinates are, and `further` texts.
+    That is its scalar coordinates, the places of its signals (their attribute `place`), `further` texts, and
+    what the ratios among its coordinates are.
     """
     scalars = [c for c in data.coords.values() if c.ndim == 0 and c.dtype.kind in "fiu"]
     known = list(_SYMBOLS)
@@ -172,7 +172,7 @@ def caption(data: xr.DataArray | xr.Dataset, further: Iterable[str] = ()) -> str
     places = dict.fromkeys(str(signal.attrs["place"]) for signal in signals if "place" in signal.attrs)
     ratios = (text for name, text in _RATIOS.items() if name in data.coords)
     lines: list[str] = []
-    for part in (*map(written_value, scalars), *places, *ratios, *further):
+    for part in (*map(written_value, scalars), *places, *further, *ratios):
         if lines and len(_MARKUP.sub("", f"{lines[-1]}, {part}")) <= _CAPTION_WIDTH:
             lines[-1] = f"{lines[-1]}, {part}"
         else:

@@ -142,11 +142,8 @@ def plan(study: Path, output: Path | None, trust_rig: bool, part: str | None) ->
 def status(store: Path) -> int:
     """Show the progress of STORE and its failed cases; works during a run."""
     from rubhpc.storage.status import read_status
-    from rubhpc.storage.verdicts import packed_verdicts
 
     click.echo(read_status(store).text())
-    if shown := packed_verdicts(store):
-        click.echo(shown)
     return 0
 
 

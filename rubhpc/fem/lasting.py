@@ -67,26 +67,20 @@ def decay_message(cases: Iterable[tuple[Model, float]]) -> str:
     Parameters
     ----------
     cases : iterable of (Model, float)
-        Models, each at a spin, rad/s; at standstill the time takes the place of the revolutions.
+        Models, each at a spin, rad/s.
     """
     slowest, text = 0.0, ""
     for model, spin in cases:
         for name, mode in _decaying(model, spin):
-            lasts = LEFT / -mode.eigenvalue.real
-            if spin:
-                lasts *= abs(spin) / (2.0 * math.pi)
-            if lasts <= slowest:
-                continue
-            slowest, unit = lasts, "revolutions" if spin else "seconds"
-            at = f"at {abs(spin) * 30.0 / math.pi:.6g} rpm " if spin else ""
-            needed = (
-                f"{math.ceil(lasts)}, which needs transient = {math.ceil(lasts)}" if spin else f"{lasts:.3g}"
-            )
-            text = (
-                f"{at}the {mode.kind} mode of {mode.frequency:.4g} Hz of {name}, damping "
-                f"{mode.damping_ratio:.2g}, decays slowest: by half in {lasts * math.log(2.0) / LEFT:.3g} "
-                f"{unit}, to 1 % in {needed}"
-            )
+            lasts = LEFT / -mode.eigenvalue.real * abs(spin) / (2.0 * math.pi)
+            if lasts > slowest:
+                slowest, n = lasts, math.ceil(lasts)
+                text = (
+                    f"at {abs(spin) * 30.0 / math.pi:.6g} rpm the {mode.kind} mode of {mode.frequency:.4g} Hz "
+                    f"of {name}, damping {mode.damping_ratio:.2g}, decays slowest: by half in "
+                    f"{lasts * math.log(2.0) / LEFT:.3g} revolutions, to 1 % in {n}, "
+                    f"which needs transient = {n}"
+                )
     return text
 
 

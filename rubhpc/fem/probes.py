@@ -45,7 +45,7 @@ def with_probes(model: Model, rig: Rig, probes: Sequence[Probe], spin: float) ->
     nodes = tuple(dict.fromkeys(s.node for s in model.stators if s.node != model.output_node))
     bearings = [
         (number, bearing.clearance)
-        for number, bearing in enumerate(rig.rotor.bearing, 1)
+        for number, bearing in enumerate(getattr(rig.rotor, "bearing", ()), 1)
         if bearing.clearance is not None
     ]
     known = (

@@ -88,7 +88,7 @@ def _summary(job: Job, store: Store, ledger: Ledger, computed: int, seconds: flo
         computed=computed,
         seconds=seconds,
         reasons=tuple((store.manifest.name_case(i), ledger.reasons.get(i, "")) for i in failed),
-        verdicts="" if measures is None else verdicts(store.manifest, is_done, lambda name: measures[name]),
+        verdicts="" if measures is None else verdicts(store.manifest, is_done, measures),
         flawed=sum(1 for i in ledger.reasons if job.share[i] and ledger.status[i] == DONE),
         part="" if job.part is None else str(job.part),
         n_elsewhere=int((ledger.status == MISSING).sum()) - count(own)[MISSING],

@@ -2,50 +2,47 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.schema import DONE, REGIME, SETTLED, VARIABLES
-from rubhpc.storage.manifest import PRIVATE, Manifest
-from rubhpc.storage.packed import PackingNote, read_packed
+from rubhpc.schema import REGIME, SETTLED
 from rubhpc.study.contact_axes import PREFIX, choices_of
 from rubhpc.validity import MONITORS, STEADY_SLIP, counted
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
     from numpy.typing import NDArray
 
-    Read = Callable[[str], NDArray[Any] | None]
+    from rubhpc.storage.manifest import Manifest
 
 _LAW = f"{PREFIX}friction_law"
 
 
-def verdicts(manifest: Manifest, is_done: NDArray[np.bool_], read: Read) -> str:
+def verdicts(manifest: Manifest, is_done: NDArray[np.bool_], measures: NDArray[np.void]) -> str:
     """Return the line; "" where nothing is known.
 
     Parameters
     ----------
     is_done : (n_case,)
         The cases that count.
-    read : callable
-        Values of a measure of the store by its name, one a case, (n_case,) or (n_case, n_stator).
+    measures : (n_case,) record
+        Those of the store.
     """
-    known = {measure.name for measure in manifest.measures}
+    known = measures.dtype.names or ()
     parts = []
-    if "regime" in known and (regime := read("regime")) is not None:
+    if "regime" in known:
+        regime = measures["regime"]
         counts = np.bincount(regime[is_done & (regime >= 0)], minlength=len(REGIME))
         named = [f"{n} {name.replace('_', ' ')}" for name, n in zip(REGIME, counts, strict=True) if n]
         parts += [", ".join(named)] if named else []
-    if "settled" in known and (settled := read("settled")) is not None:
-        n_moving = int((settled[is_done] == SETTLED.index("not_settled")).sum())
+    if "settled" in known:
+        n_moving = int((measures["settled"][is_done] == SETTLED.index("not_settled")).sum())
         parts += [f"{n_moving} not settled"] if n_moving or parts else []
     codes = np.zeros(manifest.n_case, np.int16)
     is_watched = False
     for i, (name, monitor) in enumerate(MONITORS.items()):
-        if name in known and (values := read(name)) is not None:
+        if name in known:
+            values = measures[name]
             is_out = monitor.is_out(values)
             is_out = is_done & (is_out.any(axis=1) if is_out.ndim > 1 else is_out)
             if name == STEADY_SLIP:
@@ -56,22 +53,6 @@ def verdicts(manifest: Manifest, is_done: NDArray[np.bool_], read: Read) -> str:
     if is_watched:
         parts.append(f"{n_out} out of the model's range" + (f": {counted(codes)}" if n_out else ""))
     return "; ".join(parts)
-
-
-def packed_verdicts(path: Path) -> str:
-    """Return the line of the store at `path` as its arrays have it; "" while a run has not packed them."""
-    manifest = Manifest.read(path)
-    private = path / PRIVATE
-    if not PackingNote(private / "packed.json", private / "journal").is_current():
-        return ""
-
-    def read(name: str) -> NDArray[Any] | None:
-        variable = next((v for v in manifest.packed if v.name == name), VARIABLES[name])
-        values = read_packed(path, manifest, variable)
-        return None if values is None else values.reshape(manifest.n_case, *manifest.extent(variable))
-
-    status = read("status")
-    return "" if status is None else verdicts(manifest, status == DONE, read)
 
 
 def _may_reverse(manifest: Manifest) -> NDArray[np.bool_]:

@@ -75,8 +75,8 @@ def heard(signals: Floats, samples_per_revolution: int, least: float, *, jumps: 
     """What `settled` compares of other signals in each revolution, (n, n_revolution, n_value).
 
     Those that vary by less than `least`, or by less than 1e-4 of their largest value, are left out. Of
-    signals that jump, which differ in a whole sample where a contact begins a little later, it is the mean
-    and the standard deviation of each revolution.
+    signals that jump, which differ in a whole sample where a contact begins a little later, it is the
+    standard deviation in each revolution.
 
     Parameters
     ----------
@@ -87,9 +87,10 @@ def heard(signals: Floats, samples_per_revolution: int, least: float, *, jumps: 
     most = np.abs(signals).max(axis=1, initial=0.0)
     audible = signals[signals.std(axis=1) > np.maximum(least, NEGLIGIBLE * most)]
     n_revolution = signals.shape[1] // samples_per_revolution
-    cycles: Floats = audible.reshape(len(audible), n_revolution, samples_per_revolution)
+    about = audible - audible.mean(axis=1, keepdims=True)
+    cycles: Floats = about.reshape(len(audible), n_revolution, samples_per_revolution)
     if jumps:
-        return np.stack([cycles.mean(axis=2), cycles.std(axis=2)], axis=2)
+        return np.asarray(cycles.std(axis=2, keepdims=True))
     return cycles / math.sqrt(samples_per_revolution)
 
 
@@ -120,9 +121,8 @@ def _has_settled(cycles: Floats, size: Floats, period: int, *, is_contact: bool)
 
 
 def _size(cycles: Floats) -> Floats:
-    """Standard deviation of signals of which these are the cycles, (n,)."""
-    about = cycles - cycles.mean(axis=(1, 2), keepdims=True)
-    return np.asarray(np.sqrt((about**2).sum(axis=2).mean(axis=1)))
+    """Size of signals, (n,): root mean square over the revolutions."""
+    return np.asarray(np.sqrt((cycles**2).sum(axis=2).mean(axis=1)))
 
 
 def is_steady(energy: Floats) -> bool:
