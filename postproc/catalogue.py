@@ -11,7 +11,7 @@ import ast
 import inspect
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -89,6 +89,7 @@ class Figure:
         InputError
             A value is none of those offered or out of range, or the cases cannot be drawn so.
         """
+        from postproc.cases.maps import verdict_of
         from postproc.signals.places import named_places
 
         given = inspect.Signature(self.parameters).bind(*args, **words).arguments
@@ -96,7 +97,7 @@ class Figure:
             self.options[name].check(value)
         function = getattr(import_module(f"postproc.figures.{self.name}"), self.name)
         drawing: Drawing = function(named_places(cases), *args, **words)
-        return drawing
+        return replace(drawing, verdict=verdict_of(cases))
 
 
 def figures() -> dict[str, Figure]:

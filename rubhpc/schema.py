@@ -121,10 +121,24 @@ _MEASURES = (
         "stator",
     ),
     _measure(
+        "normal_angle",
+        "rad",
+        "largest angle in contact from the fixed normal to the line of centres (0: updated normal)",
+        "stator",
+    ),
+    _measure(
+        "force_over_strength", "1", "peak contact force over the stator's strength (0: none given)", "stator"
+    ),
+    _measure(
         "carrier_displacement",
         "m",
         "peak displacement of what the stator stands on (0: the ground)",
         "stator",
+    ),
+    _measure(
+        "bearing_clearance_ratio",
+        "1",
+        "largest displacement in a bearing over its clearance (0: none given)",
     ),
     _measure("peak_torsion", "rad", "peak torsional displacement"),
     _measure("peak_to_peak_vertical", "m", "peak-to-peak vertical displacement"),

@@ -14,23 +14,19 @@ from postproc.store.select import narrow
 from postproc.store.units import meanings
 from postproc.store.variables import require_variables
 from rubhpc.errors import InputError
-from rubhpc.schema import HAS_VALUES, VARIABLES, role_of
+from rubhpc.schema import HAS_VALUES, REGIME, SETTLED, VARIABLES, role_of
 from rubhpc.study.axes import SPEED_AXES, coordinate_of
+from rubhpc.validity import MONITORS, STEADY_SLIP, counted, words
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
+
+    from rubhpc.validity import Monitor
 
 _ROLES = ("measure", "flag", "setting")
 MAPPABLE = tuple(n for n, v in VARIABLES.items() if v.role in _ROLES)
 _FRICTION_LAW = "contact_friction_law"  # where it is an axis: under Coulomb's law slip may reverse
 MOST_FACETS, MOST_PANELS = 2, 6
-# Where the model leaves its range, by variable: the flag, what is out of range, and the test.
-VALIDITY: dict[str, tuple[int, str, Callable[[xr.DataArray], xr.DataArray]]] = {
-    "minimum_slip_speed": (1, "slip", lambda slip: slip < 0),
-    "force_over_euler_load": (2, "Euler load", lambda ratio: ratio > 1),
-    "foreshortening_ratio": (4, "bending", lambda ratio: ratio > 0.1),
-    "tip_deflection_ratio": (4, "bending", lambda ratio: ratio > 0.1),
-}
 
 
 def is_mappable(name: str) -> bool:
@@ -118,9 +114,7 @@ def map_data(store: xr.Dataset, value: str, spread: Sequence[str], facets: Seque
     -------
     Dataset over (*facets, y, x), or (*facets, case)
         The value, `status`, `settled` where the store has it (0: the record shows a transient), and
-        `validity`: 0 within the model's range, else the sum of 1 (slip reverses, so that steady sliding is
-        wrong), 2 (force over the stator's Euler load) and 4 (bending, of which the gap knows too little, or
-        by over a tenth of the length).
+        `validity`: 0 within the model's range, else a sum of bits, one for each monitor that is out of range.
     """
     if not is_mappable(value):
         require_variables(store, [value])
@@ -139,38 +133,62 @@ def map_data(store: xr.Dataset, value: str, spread: Sequence[str], facets: Seque
     return loaded
 
 
-def monitors(store: xr.Dataset) -> dict[str, tuple[int, str, Callable[[xr.DataArray], xr.DataArray]]]:
+def monitors(store: xr.Dataset) -> dict[str, Monitor]:
     """Return the monitors that hold for a store: under Coulomb's law slip may reverse."""
     contact = table_of(store, "study").get("contact", {})
     has_stick = contact.get("friction_law") == "coulomb"
-    return {n: monitor for n, monitor in VALIDITY.items() if not (has_stick and n == "minimum_slip_speed")}
+    return {n: monitor for n, monitor in MONITORS.items() if not (has_stick and n == STEADY_SLIP)}
 
 
 def validity(store: xr.Dataset) -> xr.DataArray:
-    """Return how each case leaves the model's range, over the axes: 0, or a sum of bits of `VALIDITY`."""
-    found = xr.zeros_like(store["status"], dtype=np.int8)
-    for name, (bit, _, is_bad) in monitors(store).items():
-        if name in store:
-            bad = is_bad(store[name])
+    """Return how each case leaves the model's range, over the axes: 0, or a sum of bits of `MONITORS`."""
+    found = xr.zeros_like(store["status"], dtype=np.int16)
+    watched = monitors(store)
+    for i, (name, monitor) in enumerate(MONITORS.items()):
+        if name in watched and name in store:
+            bad = monitor.is_out(store[name])
             # A case is out of range where one of its stators is, whichever is drawn.
             bad = bad.any([d for d in ("stator",) if d in bad.dims])
-            if name == "minimum_slip_speed" and _FRICTION_LAW in store.coords:
+            if name == STEADY_SLIP and _FRICTION_LAW in store.coords:
                 bad &= store[_FRICTION_LAW] != meanings(store[_FRICTION_LAW]).index("coulomb")
-            found = found | np.int8(bit) * bad.astype(np.int8)
-    texts = {bit: text for bit, text, _ in monitors(store).values()}
-    legend = ", ".join(f"{bit} ({text} out of range)" for bit, text in texts.items())
+            found = found | np.int16(1 << i) * bad.astype(np.int16)
+    legend = ", ".join(
+        f"{1 << i} ({monitor.name} out of range)"
+        for i, (name, monitor) in enumerate(MONITORS.items())
+        if name in watched
+    )
     return found.rename("validity").assign_attrs(units="1", long_name=f"sum of {legend}")
 
 
 def out_of_range(data: xr.Dataset) -> tuple[str, bool]:
     """Return what is out of the model's range in `map_data`, in words, and whether most cases are.
 
-    The words name the reasons and count the cases, of those that have values.
+    The words name the monitors and count the cases, of those that have values.
     """
     has_values = np.isin(data["status"].values, HAS_VALUES)
     validity = np.where(has_values, data["validity"].values, 0)
-    counts = {text: np.count_nonzero(validity & bit) for bit, text, _ in VALIDITY.values()}
-    reasons = ", ".join(f"{text} ({n})" for text, n in counts.items() if n)
     n, n_all = np.count_nonzero(validity), np.count_nonzero(has_values)
     count = f"all {n} cases" if n == n_all else f"{n} of {n_all} cases"
-    return f"out of range in {count}: {reasons}", bool(n > 0.5 * n_all)
+    return f"out of range in {count}: {counted(validity)}", bool(n > 0.5 * n_all)
+
+
+def verdict_of(cases: xr.Dataset) -> tuple[str, ...]:
+    """Return what a caption says of a single case that is done; nothing of several cases.
+
+    That is its regime or period, whether it had not settled, and the monitors that are out of range.
+    """
+    if "status" not in cases or any(cases.sizes[axis] != 1 for axis in axes_of(cases)):
+        return ()
+    names = [n for n in ("status", "regime", "period", "settled", *MONITORS) if n in cases]
+    case = cases[names].isel(dict.fromkeys(axes_of(cases), 0)).load()
+    if int(case["status"]) not in HAS_VALUES:
+        return ()
+    found = []
+    regime, period = (int(case[n]) if n in case else -1 for n in ("regime", "period"))
+    if regime >= 0:
+        word = REGIME[regime].replace("quasi_", "quasi-").replace("_", " ")
+        found.append(f"period {period}" if period > 0 and REGIME[regime] == "periodic" else word)
+    if "settled" in case and int(case["settled"]) == SETTLED.index("not_settled"):
+        found.append("not settled")
+    code = int(validity(case))
+    return (*found, *(f"out of range: {words(code)}".split(", ") if code else ()))

@@ -36,6 +36,8 @@ class Drawing:
         mm; by default as in `postproc.figures.style.new_figure`.
     lines : tuple of str
         What the figure command prints before it draws.
+    verdict : tuple of str
+        What the caption says of a single case besides (`postproc.cases.maps.verdict_of`).
     files : mapping of Path to Dataset
         Further data that the options ask to write.
     """
@@ -47,6 +49,7 @@ class Drawing:
     height: float | None = None
     width: float | None = None
     lines: tuple[str, ...] = ()
+    verdict: tuple[str, ...] = ()
     files: Mapping[Path, xr.Dataset] = field(default_factory=dict)
 
     def save(self, path: str | Path) -> Path:
@@ -55,7 +58,7 @@ class Drawing:
         with house_style():
             figure, axes = new_figure(n_row, self.height, self.width, n_column, self.is_shared)
             self.draw(axes)
-            figure.suptitle(caption(self.shown), fontsize=7, x=0.02, ha="left")
+            figure.suptitle(caption(self.shown, self.verdict), fontsize=7, x=0.02, ha="left")
             return save(figure, path)
 
     def show(self, ax: Axes | Sequence[Axes] | None = None) -> Axes | list[Axes]:
@@ -91,5 +94,5 @@ class Drawing:
                 sharey=self.is_shared and n_column > 1,
                 squeeze=False,
             )
-            figure.suptitle(caption(self.shown), fontsize=7, x=0.02, ha="left")
+            figure.suptitle(caption(self.shown, self.verdict), fontsize=7, x=0.02, ha="left")
         return list(made.ravel())

@@ -6,9 +6,8 @@ import time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
-from postproc.cases.maps import VALIDITY, monitors
+from postproc.cases.maps import monitors
 from postproc.cases.saltelli import drawn_ranges
 from postproc.report.grid import plain
 from postproc.report.settings import setting_rows
@@ -18,20 +17,15 @@ from postproc.store.units import short_name
 from rubhpc.integrate.record import MOST_RESIDUAL
 from rubhpc.schema import DIVERGED, DONE, FAILED, INFERRED, MISSING, STATUS, VARIABLES
 from rubhpc.units import Scale, scale_for
+from rubhpc.validity import MONITORS
 
 if TYPE_CHECKING:
+    import xarray as xr
     from numpy.typing import NDArray
 
     from postproc.report.grid import Measures
 
 _MOST_FAILURES = 200  # listed, of each kind
-_LIMITS = {
-    "minimum_slip_speed": "below 0: the rim slips backwards, which contradicts steady sliding",
-    "force_over_euler_load": "above 1: the stator would buckle",
-    "foreshortening_ratio": 'above 0.1: forces are too large by 10 % or more; use geometry = "second_order"',
-    "tip_deflection_ratio": "above 0.1: the stator is no longer a linear beam",
-}
-
 
 # The measure leaves the range of steady sliding only; the store's friction law covers it.
 _FOLLOWED = {"minimum_slip_speed": "no limit of the model; below 0 the rim slips back (Coulomb's law)"}
@@ -95,13 +89,13 @@ def validity_rows(
     """Return a row for each monitor: its limit, how many cases are beyond it, and the worst of them."""
     rows = []
     watched = monitors(store)
-    for name, (_, text, is_bad) in VALIDITY.items():
+    for name, monitor in MONITORS.items():
         if name not in measures.names:
             continue
         values = measures.values(name)
-        bad = is_bad(xr.DataArray(values)).values  # NaN is beyond nothing
+        bad = monitor.is_out(values)  # NaN is beyond nothing
         worst = np.nanargmin if VARIABLES[name].worst == "min" else np.nanargmax
-        limit = _LIMITS.get(name, f"{text} out of range") if name in watched else _FOLLOWED[name]
+        limit = f"{monitor.name}, {monitor.text}" if name in watched else _FOLLOWED[name]
         rows.append(_row(measures, axes, name, bad, worst, n_done, limit))
     if "energy_residual" in measures.names:
         bad = measures.values("energy_residual") > MOST_RESIDUAL

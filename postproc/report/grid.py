@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import re
+from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from postproc.cases.maps import MAPPABLE, VALIDITY, is_mappable, validity
+from postproc.cases.maps import MAPPABLE, is_mappable, validity
 from postproc.figures.cells import cell_edges, is_geometric
 from postproc.figures.palette import categories
 from postproc.store.attributes import table_of
 from postproc.store.axes import axes_of, drawn_axes
-from postproc.store.rig_of_case import has_beams
+from postproc.store.rig_of_case import unused_monitors
 from postproc.store.units import displayed, meanings, short_name
 from postproc.store.worst import worst_word
 from rubhpc.errors import RubError
 from rubhpc.schema import DIVERGED, HAS_VALUES, PROBE, SIGNAL_NAMES, VARIABLES
 from rubhpc.units import Scale, scale_for
+from rubhpc.validity import MONITORS, words
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,7 +36,7 @@ _FIRST = (
     "peak_torsion",
     "clearance",
     "spin_speed",
-    *VALIDITY,
+    *MONITORS,
     "energy_residual",
     "contacts_per_revolution",
     "contact_fraction",
@@ -51,7 +53,6 @@ _SHARED = (
     (("peak_torsion",), ("torsion",)),
     (("peak_contact_force",), ("contact_force",)),
 )
-_OF_BEAMS = ("force_over_euler_load", "tip_deflection_ratio")
 _MATHTEXT = re.compile(r"\s*\$[^$]*\$")
 
 
@@ -63,8 +64,7 @@ class Measures:
         store = store.assign(validity=validity(store)).reset_coords(self._drawn)
         of_probes = [n for n in map(str, store.data_vars) if n not in MAPPABLE and is_mappable(n)]
         names = [n for n in (*MAPPABLE, "validity", *of_probes, *self._drawn) if n in store.data_vars]
-        if not _has_beams(store):
-            names = [n for n in names if n not in _OF_BEAMS]
+        names = [n for n in names if n not in _unused(store)]
         names.sort(key=lambda n: _FIRST.index(n) if n in _FIRST else len(_FIRST))
         self._data = store[names].load()
         self._dims = axes_of(store)
@@ -156,7 +156,7 @@ class Measures:
         values = self.values(name)
         codes = [int(c) for c in np.unique(values[np.isfinite(values)])]
         if name == "validity":
-            beyond = iter(_BEYOND)
+            beyond = cycle(_BEYOND)
             return [
                 {"code": c, "name": validity_text(c), "color": next(beyond) if c else _WITHIN} for c in codes
             ]
@@ -166,12 +166,12 @@ class Measures:
         ]
 
 
-def _has_beams(store: xr.Dataset) -> bool:
-    """Whether what beams alone have, a length and an Euler load, is worth showing."""
+def _unused(store: xr.Dataset) -> set[str]:
+    """Return the monitors of what the rig does not have, which are not worth showing."""
     try:
-        return has_beams(store)
+        return unused_monitors(store)
     except RubError:  # the page says elsewhere that the rig cannot be read
-        return True
+        return set()
 
 
 def _measured(name: str) -> str:
@@ -181,9 +181,7 @@ def _measured(name: str) -> str:
 
 def validity_text(code: int) -> str:
     """Name the limits of the model that a case breaks."""
-    return (
-        ", ".join({bit: text for bit, text, _ in VALIDITY.values() if code & bit}.values()) or "within range"
-    )
+    return words(code) or "within range"
 
 
 def described_axes(store: xr.Dataset) -> list[dict[str, Any]]:

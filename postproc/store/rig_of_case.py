@@ -145,11 +145,24 @@ def stator_places(case: xr.Dataset) -> list[tuple[float, ...]]:
     return [(s.angle, s.clearance_offset, across, up) for s in (rig.stator[i] for i in around)]
 
 
-def has_beams(case: xr.Dataset) -> bool:
-    """Whether a stator is a beam, with a length and an Euler load; true where no rig says otherwise."""
+def unused_monitors(case: xr.Dataset) -> set[str]:
+    """Return the measures that compare with what no part of the rig has; none where the rig is not known.
+
+    These are a length and an Euler load, which beams have, the strength of a stator and the clearance of a
+    bearing.
+    """
     if not table_of(case, "rig"):
-        return True
-    return any(isinstance(stator, Stator) for stator in rig_of(case).stator)
+        return set()
+    rig = rig_of(case)
+    is_used = {
+        "force_over_euler_load": any(isinstance(stator, Stator) for stator in rig.stator),
+        "tip_deflection_ratio": any(isinstance(stator, Stator) for stator in rig.stator),
+        "force_over_strength": any(stator.strength is not None for stator in rig.stator),
+        "bearing_clearance_ratio": any(
+            bearing.clearance is not None for bearing in getattr(rig.rotor, "bearing", ())
+        ),
+    }
+    return {name for name, used in is_used.items() if not used}
 
 
 def is_carried(case: xr.Dataset) -> bool:

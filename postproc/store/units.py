@@ -13,6 +13,8 @@ from rubhpc.schema import PROBE
 from rubhpc.units import RPM, scale_for
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import NDArray
 
     from rubhpc.units import Scale
@@ -53,8 +55,11 @@ _SHORT = {
     "time": "Time",
     "wall_time": "Wall time",
     "tip_deflection_ratio": "Tip deflection over length",
-    "foreshortening_ratio": "Neglected curvature over compression",
+    "foreshortening_ratio": "Foreshortening over compression",
     "force_over_euler_load": "Contact force over Euler load",
+    "force_over_strength": "Contact force over stator strength",
+    "normal_angle": "Normal angle",
+    "bearing_clearance_ratio": "Displacement over bearing clearance",
     "largest_multiplier": "Modulus of the largest multiplier",
     "multiplier_angle": "Angle of the largest multiplier",
     "stick_fraction": "Fraction of contact without slip",
@@ -154,11 +159,11 @@ def plain_number(value: float, digits: int = 4) -> str:
     return f"{value:.0f}" if is_long else f"{value:.{digits}g}"
 
 
-def caption(data: xr.DataArray | xr.Dataset) -> str:
+def caption(data: xr.DataArray | xr.Dataset, further: Iterable[str] = ()) -> str:
     """Return what holds for all of `data`, in lines that fit a column.
 
-    That is its scalar coordinates, the places of its signals (their attribute `place`) and what the ratios
-    among its coordinates are.
+    That is its scalar coordinates, the places of its signals (their attribute `place`), `further` texts, and
+    what the ratios among its coordinates are.
     """
     scalars = [c for c in data.coords.values() if c.ndim == 0 and c.dtype.kind in "fiu"]
     known = list(_SYMBOLS)
@@ -167,7 +172,7 @@ def caption(data: xr.DataArray | xr.Dataset) -> str:
     places = dict.fromkeys(str(signal.attrs["place"]) for signal in signals if "place" in signal.attrs)
     ratios = (text for name, text in _RATIOS.items() if name in data.coords)
     lines: list[str] = []
-    for part in (*map(written_value, scalars), *places, *ratios):
+    for part in (*map(written_value, scalars), *places, *further, *ratios):
         if lines and len(_MARKUP.sub("", f"{lines[-1]}, {part}")) <= _CAPTION_WIDTH:
             lines[-1] = f"{lines[-1]}, {part}"
         else:

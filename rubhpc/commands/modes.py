@@ -82,7 +82,7 @@ def modes(
     from rubhpc.commands.design import plain_design, print_design
     from rubhpc.fem.assemble import assemble
     from rubhpc.fem.constraints import FLOATS, find_rigid_body_mode
-    from rubhpc.fem.lasting import undamped_message
+    from rubhpc.fem.lasting import decay_message, undamped_message
     from rubhpc.fem.linear_design import linear_design
     from rubhpc.fem.modes import modes as find_modes
     from rubhpc.fem.stability import instability_message
@@ -135,6 +135,8 @@ def modes(
         click.echo(json.dumps({"speeds": points} | added))
     else:
         _print_tables(found, stators, carriers, count or N_TABLE)
+        for message in filter(None, (decay_message([(model, spin)]) for spin in spins)):
+            click.echo(f"\n{message[:1].upper()}{message[1:]}.")
         if design is not None:
             print_design(design)
     drawing = None

@@ -1,7 +1,8 @@
-"""Modes that nothing damps: what excites them lasts, and a motion that has settled does not look it."""
+"""Modes that nothing damps, whose motion lasts, and the mode whose motion decays slowest."""
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,10 +11,12 @@ from rubhpc.fem.modes import modes
 from rubhpc.fem.stability import is_rounding
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from rubhpc.fem.model import Body, Model
     from rubhpc.fem.modes import Mode
+
+LEFT = math.log(100.0)  # logarithm of the share that a transient is to take off a free motion
 
 
 def undamped(body: Body, spin: float = 0.0) -> list[Mode]:
@@ -54,6 +57,47 @@ def undamped_message(model: Model, spin: float) -> str:
         f"no damping acts on {', and '.join(named)}: once excited, it does not decay, and a motion that is "
         "otherwise settled looks quasi-periodic; add damping"
     )
+
+
+def decay_message(cases: Iterable[tuple[Model, float]]) -> str:
+    """Return one line on the mode that takes the most revolutions to decay; "" where none decays.
+
+    Modes that nothing damps, unstable ones and axial ones of the rotor do not count.
+
+    Parameters
+    ----------
+    cases : iterable of (Model, float)
+        Models, each at a spin, rad/s.
+    """
+    slowest, text = 0.0, ""
+    for model, spin in cases:
+        for name, mode in _decaying(model, spin):
+            lasts = LEFT / -mode.eigenvalue.real * abs(spin) / (2.0 * math.pi)
+            if lasts > slowest:
+                slowest, n = lasts, math.ceil(lasts)
+                text = (
+                    f"at {abs(spin) * 30.0 / math.pi:.6g} rpm the {mode.kind} mode of {mode.frequency:.4g} "
+                    f"Hz of {name}, damping {mode.damping_ratio:.2g}, decays slowest: by half in "
+                    f"{lasts * math.log(2.0) / LEFT:.3g} revolutions, to 1 % in {n}, "
+                    f"which needs transient = {n}"
+                )
+    return text
+
+
+def _decaying(model: Model, spin: float) -> Iterator[tuple[str, Mode]]:
+    """The modes at a spin that decay, each with the name of its body; of equal stators those of the first."""
+    bodies = {id(stator.body): (f"stator {k}", stator.body) for k, stator in enumerate(model.stators, 1)}
+    bodies |= {
+        id(carrier.body): (f"carrier {carrier.name} with {stator_names(carrier.stators)}", carrier.body)
+        for carrier in model.carriers
+    }
+    rotor = [mode for mode in modes(model.rotor, spin) if mode.kind != "axial"]
+    found = [("the rotor", rotor), *((name, modes(body)) for name, body in bodies.values())]
+    for name, those in found:
+        greatest = max((abs(mode.eigenvalue) for mode in those), default=0.0)
+        for mode in those:
+            if mode.frequency > 0.0 and mode.eigenvalue.real < 0.0 and not is_rounding(mode, greatest):
+                yield name, mode
 
 
 def stator_names(stators: Sequence[int]) -> str:

@@ -197,6 +197,7 @@ class StatorModel:
     # (n_dof, n_dof), 1/m: the tip draws back by half the form of the displacements; None: not counted
     squared_slope: NDArray[np.float64] | None = None
     centre: tuple[float, float] = (0.0, 0.0)  # m, about which it is set: v and w of the shaft there
+    strength: float = math.inf  # N, contact force that it bears
     alone: StatorModel | None = None  # on a carrier: while that is held; `body` is all that stands on it
 
     @cached_property
@@ -225,26 +226,38 @@ class CarrierModel:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ProbeRows:
-    """What each probe sees of a model at one speed.
+    """What each probe sees of a model at one speed, and the monitors at places where no signal is recorded.
 
     Attributes
     ----------
     probes : tuple of Probe
-    rows : (3, n_probe, n_all)
+    rows : (3, n_probe + 2 n_watched, n_all)
         Factors of displacements, velocities and accelerations of all bodies (`Model.bodies`), measured from
-        the sagged shaft.
-    constant : (n_probe,)
+        the sagged shaft: of the probes, then of vertical and horizontal displacement at each watched place.
+    constant : (n_probe + 2 n_watched,)
         What is seen of the sag.
+    nodes : tuple of int
+        The first watched places: nodes that stators face.
+    clearances : tuple of float
+        The other ones: bearings, whose clearance this is, m; the displacement is relative to what they stand
+        on.
     """
 
     probes: tuple[Probe, ...]
     rows: NDArray[np.float64]
     constant: NDArray[np.float64]
+    nodes: tuple[int, ...] = ()
+    clearances: tuple[float, ...] = ()
+
+    @property
+    def of_probes(self) -> NDArray[np.float64]:
+        """The rows of the probes, (3, n_probe, n_all), for whose accuracy modes and steps are chosen."""
+        return self.rows[:, : len(self.probes)]
 
     @property
     def patterns(self) -> NDArray[np.float64]:
         """Degrees that probes see together, (n_all, n_pattern), each of length 1."""
-        seen = self.rows.reshape(-1, self.rows.shape[2])
+        seen = self.of_probes.reshape(-1, self.rows.shape[2])
         seen = seen[np.any(seen != 0.0, axis=1)]
         return np.unique(seen / np.linalg.norm(seen, axis=1, keepdims=True), axis=0).T
 
@@ -316,13 +329,18 @@ class Model:
 
     @property
     def n_probe(self) -> int:
-        """Number of probes."""
-        return 0 if self.probe is None else len(self.probe.probes)
+        """Number of probes and of what the monitors see beside them."""
+        return 0 if self.probe is None else self.probe.constant.size
 
     @property
     def probe_rows(self) -> NDArray[np.float64]:
-        """What probes see of displacements, velocities and accelerations, (3, n_probe, n_all)."""
+        """What is seen of displacements, velocities and accelerations, (3, n_probe, n_all)."""
         return np.zeros((3, 0, self.body_start[-1])) if self.probe is None else self.probe.rows
+
+    @property
+    def sensor_rows(self) -> NDArray[np.float64]:
+        """The same by probes alone (`ProbeRows.of_probes`)."""
+        return self.probe_rows if self.probe is None else self.probe.of_probes
 
     @property
     def probe_patterns(self) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""What probes see: linear functions of the displacements, velocities and accelerations of all bodies."""
+"""What probes and monitors see: linear functions of the motion of all bodies."""
 
 from __future__ import annotations
 
@@ -35,25 +35,46 @@ DISPLACEMENT, VELOCITY, ACCELERATION = range(3)
 def with_probes(model: Model, rig: Rig, probes: Sequence[Probe], spin: float) -> Model:
     """Return a model with probes, at the spin (rad/s) at which its bearings are.
 
+    Monitors look at the nodes that stators face, except the recorded one, and at bearings with a clearance.
+
     Raises
     ------
     InputError
         Where there is nothing to be measured: no such node, stator or bearing, or one that is held.
     """
     probes = tuple(probes)
-    known = () if model.probe is None else model.probe.probes
-    if known == probes and model.rotor.by_speed is None:  # as it is, with what has been derived from it
+    nodes = tuple(dict.fromkeys(s.node for s in model.stators if s.node != model.output_node))
+    bearings = [
+        (number, bearing.clearance)
+        for number, bearing in enumerate(getattr(rig.rotor, "bearing", ()), 1)
+        if bearing.clearance is not None
+    ]
+    known = (
+        ProbeRows(probes=(), rows=np.zeros(0), constant=np.zeros(0)) if model.probe is None else model.probe
+    )
+    clearances = tuple(clearance for _, clearance in bearings)
+    is_known = known.probes == probes and known.nodes == nodes and known.clearances == clearances
+    if is_known and model.rotor.by_speed is None:  # as it is, with what has been derived from it
         return model
-    if not probes:
+    places: list[tuple[int, int | None]] = [(node, None) for node in nodes]
+    places += [(rig.rotor.node_of(rig.rotor.bearing[k - 1]), rig.rotor.stands_on(k)) for k, _ in bearings]
+    if not probes and not places:
         return replace(model, probe=None)
-    rows = np.zeros((3, len(probes), model.body_start[-1]))
+    rows = np.zeros((3, len(probes) + 2 * len(places), model.body_start[-1]))
+    for i, (node, far) in enumerate(places):
+        for k, name in enumerate(("v", "w"), start=len(probes) + 2 * i):
+            here, there = model.rotor.index(node, name), model.rotor.index(far or 0, name)
+            _add_force(rows[DISPLACEMENT, k], np.ones(1), [here], [there])
     for i, probe in enumerate(probes):
         try:
             _fill(rows[:, i], probe, model, rig, spin)
         except InputError as error:
             raise InputError(f"[record] probe {probe.name}: {error}") from None
     constant = seen_at_rest(model, probes, rows[DISPLACEMENT])
-    return replace(model, probe=ProbeRows(probes=probes, rows=rows, constant=constant))
+    return replace(
+        model,
+        probe=ProbeRows(probes=probes, rows=rows, constant=constant, nodes=nodes, clearances=clearances),
+    )
 
 
 def seen_at_rest(model: Model, probes: Sequence[Probe], rows: Floats) -> Floats:

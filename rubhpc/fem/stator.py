@@ -58,6 +58,7 @@ def _(stator: Stator, radius: float) -> StatorModel:
         clearance_offset=stator.clearance_offset,
         length=stator.length,
         euler_load=stator.euler_load,
+        strength=_strength(stator),
         axial=body.index(tip, "axial"),
         lateral=body.index(tip, "lateral"),
         squared_slope=stator_foreshortening(stator)[rows] if stator.geometry == SECOND_ORDER else None,
@@ -85,6 +86,11 @@ def _(stator: LumpedStator, radius: float) -> StatorModel:
     return _without_length(stator, radius, M, C, K, tuple((1, name) for name in names))
 
 
+def _strength(seat: Seat) -> float:
+    """Contact force that it bears, N; infinite where none is given."""
+    return math.inf if seat.strength is None else seat.strength
+
+
 def _without_length(
     seat: Seat,
     radius: float,
@@ -109,6 +115,7 @@ def _without_length(
         clearance_offset=seat.clearance_offset,
         length=math.inf,
         euler_load=math.inf,
+        strength=_strength(seat),
         axial=body.index(1, "axial"),
         lateral=body.index(1, "lateral"),
     )

@@ -30,9 +30,10 @@ from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
 from rubhpc.integrate.marches.curved import CurvedMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.marches.met_modes import NoClosedForm
-from rubhpc.integrate.measuring.carried import carrier_displacement, tip_deflection
+from rubhpc.integrate.measuring.carried import carrier_displacement
 from rubhpc.integrate.measuring.diverged_record import diverged_record
 from rubhpc.integrate.measuring.measures import measures_of
+from rubhpc.integrate.measuring.monitors import monitored
 from rubhpc.integrate.measuring.samples import (
     add_sag,
     by_name,
@@ -260,14 +261,13 @@ def _integrate(
             measures=measures_of(
                 accumulator,
                 signals,
-                deflection=tip_deflection(samples, accumulator, setup.model),
                 energy=marched.energy,
-                stators=setup.model.stators,
+                model=setup.model,
                 spin=setup.spin,
-                is_round=setup.is_updated,
                 samples_per_revolution=per_revolution,
                 judge=judge,
             )
+            | monitored(samples, accumulator, setup.model, is_round=setup.is_updated)
             | {"carrier_displacement": carrier_displacement(samples, setup.model)}
             | probe_extents(signals),
             settings=settings,

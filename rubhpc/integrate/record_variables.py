@@ -53,7 +53,10 @@ class RecordVariables:
         force_over_euler_load: Floats  # (n_stator,)
         tip_deflection_ratio: Floats  # (n_stator,)
         foreshortening_ratio: Floats  # (n_stator,)
+        normal_angle: Floats  # (n_stator,); rad
+        force_over_strength: Floats  # (n_stator,)
         carrier_displacement: Floats  # (n_stator,); m
+        bearing_clearance_ratio: float
         peak_torsion: float  # rad
         peak_to_peak_vertical: float  # m
         peak_to_peak_horizontal: float  # m

@@ -28,10 +28,10 @@ DECAYED = 0.01  # of the largest past value of a signal: reference for smaller o
 def pass_transient(march: March, recording: Recording) -> tuple[str | None, int]:
     """March through the transient, until the motion has settled where `recording` says "auto".
 
-    It has settled when no displacement of output node, tips or carriers differs from that 8 or 12 revolutions
-    before by more than `settled_within` of the signal's largest value in the cycle, or of a hundredth of its
-    largest past value, so that a decaying signal settles too. The transient ends after `longest_transient`
-    revolutions at the latest.
+    It has settled when no displacement of output node, tips or carriers, no twist, rate of the twist or probe
+    differs from that 8 or 12 revolutions before by more than `settled_within` of the signal's largest value
+    in the cycle, or of a hundredth of its largest past value, so that a decaying signal settles too. The
+    transient ends after `longest_transient` revolutions at the latest.
 
     Returns
     -------
@@ -46,7 +46,7 @@ def pass_transient(march: March, recording: Recording) -> tuple[str | None, int]
     n_place, done, limit = march.n_place, 0, recording.longest_transient
     tips = 4 + np.arange(march.n_body)  # rotations of carriers are visible in the tips that they move
     samples, accumulator = (
-        empty_samples(n_place, recording.samples_per_revolution),
+        empty_samples(n_place, recording.samples_per_revolution, march.n_probe),
         new_accumulator(march.touching().size, n_place),
     )
     idle = idle_of(march)
@@ -64,7 +64,9 @@ def pass_transient(march: March, recording: Recording) -> tuple[str | None, int]
         if reason is not None:
             return reason, done
         done += 1
-        latest = samples.whole[[VERTICAL, HORIZONTAL, TWIST, *tips, *tips + n_place]]
+        moved = samples.whole[[VERTICAL, HORIZONTAL, TWIST, *tips, *tips + n_place]]
+        rate = np.gradient(samples.rotor[TWIST])
+        latest = np.concatenate([moved, rate[np.newaxis], samples.probe])
         reached = np.abs(latest).max(axis=1)
         largest = reached if largest is None else np.maximum(largest, reached)
         if reference is not None and has_settled(

@@ -47,6 +47,13 @@ class Seat:
     clearance_offset: float = quantity(
         "m", doc="Added to the clearance of the case for this stator.", example='"10 um"', default=0.0
     )
+    strength: float | None = quantity(
+        "N",
+        doc="Contact force that the stator bears, for the monitor of it; by default it is not compared.",
+        example='"500 N"',
+        default=None,
+        above=0,
+    )
     carrier: str | None = text(
         doc="Name of the carrier on which the stator stands; by default the ground.",
         example='"casing"',

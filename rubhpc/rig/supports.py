@@ -136,6 +136,13 @@ class Pedestal(Springs):
 class Support(Masses, Placed):
     """A bearing or seal at a node, on the ground or on a pedestal."""
 
+    clearance: float | None = quantity(
+        "m",
+        doc="Radial clearance, for the monitor of displacements in it; by default they are not compared.",
+        example='"60 um"',
+        default=None,
+        above=0,
+    )
     pedestal: Pedestal | None = table(
         doc="What the bearing stands on, in series; by default the ground.", default=None
     )

@@ -15,6 +15,7 @@ from rubhpc.storage.refined import status_of
 from rubhpc.storage.runs import end_run
 from rubhpc.storage.store import Store
 from rubhpc.storage.summary import Summary
+from rubhpc.storage.verdicts import verdicts
 
 if TYPE_CHECKING:
     from rubhpc.running.beginning import RunRequest
@@ -79,12 +80,15 @@ def _clean_up(store: Store, ledger: Ledger) -> None:
 def _summary(job: Job, store: Store, ledger: Ledger, computed: int, seconds: float) -> Summary:
     own = ledger.status[job.share]
     failed = np.flatnonzero(job.share & (ledger.status == FAILED))[:_REASONS].tolist()
+    measures = ledger.measures
+    is_done = job.share & (ledger.status == DONE)
     return Summary(
         store=store.path,
         counts=count(own),
         computed=computed,
         seconds=seconds,
         reasons=tuple((store.manifest.name_case(i), ledger.reasons.get(i, "")) for i in failed),
+        verdicts="" if measures is None else verdicts(store.manifest, is_done, measures),
         flawed=sum(1 for i in ledger.reasons if job.share[i] and ledger.status[i] == DONE),
         part="" if job.part is None else str(job.part),
         n_elsewhere=int((ledger.status == MISSING).sum()) - count(own)[MISSING],

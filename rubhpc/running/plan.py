@@ -74,6 +74,8 @@ class Plan:
         What the pilot cases have shown.
     ranges : tuple of str
         Range of each axis.
+    decay : str
+        Which free motion decays slowest, and how the transient compares.
     warnings : tuple of str
         Unstable speeds, a sag beyond the clearance, modes without damping.
     n_expected : int or None
@@ -100,6 +102,7 @@ class Plan:
     start_up: float = 0.0
     memory: float = 0.0
     ranges: tuple[str, ...] = ()
+    decay: str = ""
     warnings: tuple[str, ...] = ()
     part: str = ""
     n_expected: int | None = None
@@ -189,6 +192,7 @@ class Plan:
                 f"to compute  {self.steps:.3g} steps, {cost}",
                 *self._timed,
                 *(f"failed      a pilot case: {text}" for text in self.timing.failures),
+                *([f"decay       {self.decay}"] if self.decay else []),
                 *(f"warning     {text}" for text in self.warnings),
             ]
         )
@@ -289,6 +293,7 @@ def make_plan(study: Study, part: str | None = None, say: Callable[[str], None] 
         timing=timing,
         memory=memory if timing.n_pilot else 0.0,
         ranges=axis_ranges(grid),
+        decay=grid.decay(),
         warnings=grid.warnings(),
         part="" if chosen is None else str(chosen),
         n_expected=n_expected,

@@ -17,6 +17,7 @@ from rubhpc.storage.lock import is_alive, read_holder
 from rubhpc.storage.manifest import PRIVATE, Manifest
 from rubhpc.storage.parts import Parts
 from rubhpc.storage.refined import status_of
+from rubhpc.storage.verdicts import verdicts
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from rubhpc.storage.lock import Holder
 
 _SHOWN = 10  # failed cases named
+_MOST_BYTES = 10**8  # of measures that are read for the verdicts; of larger stores a run alone tells them
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,6 +74,9 @@ class StoreStatus:
         Parts of the study that are computed apart; all of them, where their shares are known.
     n_recent : int
         Cases journalled by the latest run.
+    verdicts : str
+        Regimes of the cases that are done, and how many had not settled or left the model's range; "" of a
+        large store.
     failures : tuple of (str, str)
         Id, coordinates and reason of each failed or diverged case, or of one whose result has a flaw.
     """
@@ -83,6 +88,7 @@ class StoreStatus:
     n_damaged: int
     failures: tuple[tuple[str, str], ...]
     parts: tuple[PartStatus, ...] = ()
+    verdicts: str = ""
 
     @property
     def seconds_left(self) -> float | None:
@@ -102,6 +108,7 @@ class StoreStatus:
                 for i in (DONE, FAILED, DIVERGED, *((INFERRED,) if self.counts[INFERRED] else ()), MISSING)
             ),
         ]
+        lines += [self.verdicts] if self.verdicts else []
         if self.holder is not None:
             left = self.seconds_left
             lines.append(
@@ -134,9 +141,10 @@ def read_status(path: Path) -> StoreStatus:
         holder = read_holder(lock)
         if holder is not None and not is_alive(holder, lock):
             holder = None
-        ledger = replay(
-            path / PRIVATE / "journal", manifest.header, with_measures=manifest.refine is not None
-        )
+        header = manifest.header
+        is_read = manifest.refine is not None or manifest.n_case * header.record_type.itemsize <= _MOST_BYTES
+        ledger = replay(path / PRIVATE / "journal", header, with_measures=is_read)
+        is_done, measures = ledger.status == DONE, ledger.measures
         ledger.status = status_of(manifest, ledger.status, ledger.measures)
         parts = _read_parts(path, manifest, ledger)
     troubled = {*np.flatnonzero((ledger.status == FAILED) | (ledger.status == DIVERGED)).tolist()}
@@ -144,6 +152,7 @@ def read_status(path: Path) -> StoreStatus:
         parts=parts,
         title=manifest.title,
         counts=count(ledger.status),
+        verdicts="" if measures is None else verdicts(manifest, is_done, measures),
         holder=holder,
         n_recent=ledger.n_recent,
         n_damaged=ledger.skipped.total(),

@@ -32,6 +32,8 @@ class Summary:
         Coordinates and reason of each failed case, the first hundred.
     flawed : int
         Cases that are done with a remark: a poor energy balance, or a start at rest within a sweep.
+    verdicts : str
+        Regimes of the cases that are done, and how many had not settled or left the model's range.
     lost : int
         Ranks that died during the run; the others did their work.
     part : str
@@ -47,6 +49,7 @@ class Summary:
     reasons: tuple[tuple[str, str], ...] = ()
     lost: int = 0
     flawed: int = 0
+    verdicts: str = ""
     part: str = ""
     n_elsewhere: int = 0
 
@@ -61,7 +64,7 @@ class Summary:
         return 1 if self.counts[FAILED] else _LOST if self.lost else 0
 
     def text(self) -> str:
-        """The summary in a line."""
+        """The summary in a line, and what the cases show in another."""
         states = [i for i in (DONE, FAILED, DIVERGED, INFERRED, MISSING) if self.counts[i]]
         counts = ", ".join(f"{self.counts[i]} {STATUS[i]}" for i in states)
         flaw = f"; {self.flawed} done with a remark, rubhpc status lists them" if self.flawed else ""
@@ -70,7 +73,8 @@ class Summary:
             missing = f"{self.n_elsewhere} cases of other parts are missing"
             rest = f"; {missing}" if self.n_elsewhere else "; no case of another part is missing"
         done = f"{counts or 'no cases'}; {self.computed} computed in {duration(self.seconds)}"
-        return f"{self.name}: {done}{flaw}{rest}"
+        shown = f"\n{self.verdicts}" if self.verdicts else ""
+        return f"{self.name}: {done}{flaw}{rest}{shown}"
 
     def complaint(self) -> str:
         """What failed and how to proceed, in one line."""

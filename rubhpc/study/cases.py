@@ -25,7 +25,7 @@ from rubhpc.study.operating_points import operating_points_of
 from rubhpc.study.point_checks import check_gap, check_points
 from rubhpc.study.points import MOST_CASES, Points, boxed
 from rubhpc.study.predicted_steps import predicted_steps
-from rubhpc.study.warnings import warnings_of
+from rubhpc.study.warnings import decay_of, warnings_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -216,6 +216,10 @@ class CaseGrid:
     def warnings(self) -> tuple[str, ...]:
         """Return what the study is to be warned of: unstable speeds, sag beyond the clearance, no damping."""
         return warnings_of(self._operating_points)
+
+    def decay(self) -> str:
+        """Return which free motion decays slowest, and how the transient compares; "" without a transient."""
+        return decay_of(self._operating_points)
 
     @property
     def most_revolutions(self) -> int:

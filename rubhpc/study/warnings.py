@@ -1,4 +1,4 @@
-"""What a study is warned of before it runs: unstable rotors, sags, undamped modes."""
+"""What a study is warned of before it runs: unstable rotors, sags, how modes decay."""
 
 from __future__ import annotations
 
@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.fem.assemble import assemble
-from rubhpc.fem.lasting import undamped_message
+from rubhpc.fem.lasting import decay_message, undamped_message
 from rubhpc.fem.statics import sag_remark
 from rubhpc.units import typed_quantity
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
     from rubhpc.study.operating_points import OperatingPoints
@@ -21,7 +23,7 @@ _RPM = 30 / math.pi
 _MOST_SAGS = (
     4096  # pairs of rotor and speed whose sag is compared with the clearance; of more, an even spread
 )
-_MOST_RIGS = 8  # whose undamped modes are looked for; of more, an even spread
+_MOST_RIGS = 8  # whose modes are looked at; of more, an even spread
 
 
 def warnings_of(points: OperatingPoints) -> tuple[str, ...]:
@@ -29,6 +31,27 @@ def warnings_of(points: OperatingPoints) -> tuple[str, ...]:
     remark = sag_remark(points.model((0,) * len(points.points.dims)))
     found = (_instability(points), _sag(points), remark, _undamped(points))
     return tuple(line for line in found if line)
+
+
+def decay_of(points: OperatingPoints) -> str:
+    """Which free motion decays slowest, in a line: of a few rigs, each at its highest speed.
+
+    "" of studies without a transient.
+    """
+    study = points.study
+    if study.run_up is not None or study.drive is not None or study.branch is not None:
+        return ""
+    along, speeds = points.arrays()["spin_speed"]
+    of_rig, found = points.dims(*points.rig_axes), []
+    for at in _some_rigs(points):
+        here = speeds[tuple(at[dim] if dim in of_rig else slice(None) for dim in along)]
+        found.append((assemble(points.rig(at)), float(np.abs(here).max())))
+    text, recording = decay_message(found), study.recording
+    if not text or recording.is_transient_direct:
+        return text
+    return (
+        f"{text}; the study discards {'at most ' * recording.is_transient_auto}{recording.longest_transient}"
+    )
 
 
 def _instability(points: OperatingPoints) -> str:
@@ -79,20 +102,24 @@ def _sag(points: OperatingPoints) -> str:
 
 def _undamped(points: OperatingPoints) -> str:
     """Modes that nothing damps, of the first rig that has such, and how many rigs do."""
-    dims = points.dims(*points.rig_axes)
-    sizes = [points.points.shape[dim] for dim in dims]
-    n_rig = math.prod(sizes)
-    found = []
-    for number in np.unique(np.linspace(0, n_rig - 1, min(n_rig, _MOST_RIGS)).round().astype(int)):
-        at = [0] * len(points.points.dims)
-        for dim, i in zip(dims, np.unravel_index(number, sizes), strict=True):
-            at[dim] = int(i)
-        found.append(undamped_message(assemble(points.rig(tuple(at))), points.response(tuple(at))[0]))
+    found = [undamped_message(assemble(points.rig(at)), points.response(at)[0]) for at in _some_rigs(points)]
     named = [text for text in found if text]
     if not named:
         return ""
     share = "" if len(named) == len(found) else f"at {len(named)} of {len(found)} rigs: "
     return share + named[0]
+
+
+def _some_rigs(points: OperatingPoints) -> Iterator[tuple[int, ...]]:
+    """The index of each of a few rigs, spread evenly over all."""
+    dims = points.dims(*points.rig_axes)
+    sizes = [points.points.shape[dim] for dim in dims]
+    n_rig = math.prod(sizes)
+    for number in np.unique(np.linspace(0, n_rig - 1, min(n_rig, _MOST_RIGS)).round().astype(int)):
+        at = [0] * len(points.points.dims)
+        for dim, i in zip(dims, np.unravel_index(number, sizes), strict=True):
+            at[dim] = int(i)
+        yield tuple(at)
 
 
 def _length(size: float) -> str:

@@ -215,6 +215,6 @@ def test_a_journal_is_placed_relative_to_its_pedestal():
         rig = rig_from_dict({"name": "journals", "rotor": rotor, "stator": []}, "journals")
         model = model_at(assemble(rig), 300.0)
         seen.append(sag_at(model.rotor, model.sag, 1))
-    weight = 7800.0 * np.pi / 4 * 0.05**2 * 9.81
+    weight = (7800.0 * np.pi / 4 * 0.05**2 + 2.0) * 9.81  # with the pedestals
     assert seen[0] == pytest.approx((-2e-5, 1e-5))
     assert seen[1] == pytest.approx((-2e-5 - weight / 2 / 1e7, 1e-5), rel=1e-6)

@@ -426,7 +426,7 @@ def test_a_line_surrounds_what_is_out_of_range_where_that_is_most(plain_map, ax)
     value_maps(shown, "peak_contact_force", [ax])
     labels = [text.get_text().replace("\n", " ") for text in ax.figure.legends[0].get_texts()]
     n = int((shown["status"] == 1).sum())
-    assert labels[-1].startswith(f"out of range in all {n} cases: slip (6), Euler load (3), bending (")
+    assert labels[-1].startswith(f"out of range in all {n} cases: slip (6), Euler load (3), foreshortening (")
     assert not [patch for patch in ax.patches if patch.get_label().startswith("out of range")]
     ax.figure.canvas.draw()
 

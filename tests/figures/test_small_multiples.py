@@ -21,7 +21,7 @@ def test_few_names_are_all_written_and_many_are_thinned():
 def test_a_long_label_is_folded():
     ax = Figure(figsize=(3.46, 2.5), layout="constrained").subplots()
     (line,) = ax.plot(
-        [0, 1], label="out of range in all 4000 cases: slip (181), Euler load (226), bending (4000)"
+        [0, 1], label="out of range in all 4000 cases: slip (181), Euler load (226), foreshortening (4000)"
     )
     legend_below(ax, [line])
     (legend,) = ax.figure.legends

@@ -328,7 +328,13 @@ def test_masses_have_no_euler_load() -> None:
     beams = synthetic_store.make(n_stator=2)
     mass = {"node": 8, "radius": 0.06, "mass": 1e-3, "stiffness": 1e6, "lateral_stiffness": 1e5}
     masses = beams.assign_attrs(rig=beams.attrs["rig"] | {"stator": [mass, mass | {"angle": 1.0}]})
-    of_beams = {"force_over_euler_load", "tip_deflection_ratio"}
+    of_beams, of_keys = (
+        {"force_over_euler_load", "tip_deflection_ratio"},
+        {"force_over_strength", "bearing_clearance_ratio"},
+    )
     assert of_beams <= set(Measures(beams).names)
     assert of_beams.isdisjoint(Measures(masses).names)
     assert set(Measures(beams).names) - of_beams == set(Measures(masses).names)
+    assert of_keys.isdisjoint(Measures(beams).names)
+    strong = beams.assign_attrs(rig=beams.attrs["rig"] | {"stator": [mass | {"strength": 100.0}]})
+    assert of_keys & set(Measures(strong).names) == {"force_over_strength"}

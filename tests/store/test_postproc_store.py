@@ -65,7 +65,7 @@ def test_a_map_reads_only_its_scalar_the_status_and_the_monitors(store, chunks_r
     chunks_read.clear()
     map_data(chosen, "peak_contact_force", ["speed_ratio", "clearance"])
     monitors = {"minimum_slip_speed", "force_over_euler_load", "tip_deflection_ratio", "settled"}
-    monitors |= {"foreshortening_ratio"}
+    monitors |= {"foreshortening_ratio", "normal_angle", "force_over_strength", "bearing_clearance_ratio"}
     assert {key.split("/")[0] for key in chunks_read} == {"peak_contact_force", "status", *monitors}
 
 

@@ -147,7 +147,7 @@ class SpeedRanges:
         model, damping, stiffness = self._matrices(speed, 0.0, 0.0)
         output = self._fastest.reduced.output[:2]
         of_output = np.stack([output, 0.0 * output, 0.0 * output])
-        seen = np.concatenate([of_output, model.probe_rows @ self._basis], axis=1)
+        seen = np.concatenate([of_output, model.sensor_rows @ self._basis], axis=1)
         if is_whole:
             return Linear(stiffness, damping, self.phasor, seen)
         return Linear.of_moved(stiffness, damping, self.phasor, seen, speed)

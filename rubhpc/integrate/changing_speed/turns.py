@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rubhpc.integrate.measuring.carried import carrier_displacement, tip_deflection
-from rubhpc.integrate.measuring.measures import foreshortening_ratio
+from rubhpc.integrate.measuring.carried import carrier_displacement
+from rubhpc.integrate.measuring.monitors import monitored
 from rubhpc.integrate.measuring.samples import empty_samples, new_accumulator
 
 if TYPE_CHECKING:
@@ -84,10 +84,10 @@ def contact_measures(
     `together` is the accumulator of all revolutions, `whole` their samples (`Samples.whole`), `is_round`
     whether the gap includes the roundness of the rim.
     """
-    has_touched, stators = together.impulse > 0.0, model.stators
+    has_touched = together.impulse > 0.0
     samples = empty_samples(model.n_place, whole.shape[1], model.n_probe)
     samples.whole[:] = whole
-    deflection, none = tip_deflection(samples, together, model), np.zeros(len(stators))
+    none = np.zeros(len(model.stators))
     return {
         "contacts_per_revolution": together.n_contact / n_revolution,
         "contact_duration": np.where(
@@ -98,10 +98,5 @@ def contact_measures(
             together.stick_time, together.contact_time, out=none, where=together.contact_time > 0.0
         ),
         "minimum_slip_speed": np.where(np.isfinite(together.least_slip), together.least_slip, np.nan),
-        "force_over_euler_load": together.peak_force / [stator.euler_load for stator in stators],
-        "tip_deflection_ratio": deflection / [stator.length for stator in stators],
-        "foreshortening_ratio": foreshortening_ratio(
-            stators, deflection, together.peak_force, is_round=is_round
-        ),
         "carrier_displacement": carrier_displacement(samples, model),
-    }
+    } | monitored(samples, together, model, is_round=is_round)

@@ -27,6 +27,7 @@ class March(ABC):
     def __init__(self, check: Callable[[], None] | None, first_stride: int, model: Model) -> None:
         """Set the function to call between kernel calls, the samples of the first call, and the model."""
         self.n_place = model.n_place
+        self.n_probe = 0 if model.probe is None else len(model.probe.probes)
         self.n_body = model.n_place - len(model.turning_carriers)  # tips and carriers, their rotations aside
         self.n_step = 0
         self.n_left = 0  # times that closed form was left for short steps

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rubhpc.integrate.measuring.orbit_measures import whirl_ratio
-from rubhpc.integrate.measuring.settling import settled
+from rubhpc.integrate.measuring.settling import NEGLIGIBLE, heard, settled
 from rubhpc.kernels.accumulators import (
     DAMPING_LOSS,
     HORIZONTAL,
@@ -20,13 +20,15 @@ from rubhpc.kernels.accumulators import (
     VERTICAL,
     Accumulator,
 )
+from rubhpc.rig.probes import MOTIONS, TWISTS
+from rubhpc.schema import PROBE
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-    from rubhpc.fem.model import StatorModel
+    from rubhpc.fem.model import Model
     from rubhpc.integrate.measuring.regimes import Verdict
 
     Floats = NDArray[np.float64]
@@ -40,11 +42,9 @@ def measures_of(
     accumulator: Accumulator,
     signals: dict[str, Floats],
     *,
-    deflection: Floats,
     energy: tuple[float, float],
-    stators: tuple[StatorModel, ...],
+    model: Model,
     spin: float,
-    is_round: bool,
     samples_per_revolution: int,
     judge: Judge,
 ) -> dict[str, Any]:
@@ -52,13 +52,9 @@ def measures_of(
 
     Parameters
     ----------
-    deflection : (n_stator,), m
-        Largest lateral deflection of each tip (`carried.tip_deflection`).
     energy : (float, float), J
         Mechanical energy at the beginning and at the end of the record.
     spin : float, rad/s
-    is_round : bool
-        Whether the gap includes the roundness of the rim (updated normal).
     judge : callable
         Judges the orbit: `regimes.regime`, or `regimes.known_regime` of a motion that was solved for.
     """
@@ -93,7 +89,7 @@ def measures_of(
         "stick_fraction": np.divide(
             accumulator.stick_time,
             accumulator.contact_time,
-            out=np.zeros(len(stators)),
+            out=np.zeros(len(model.stators)),
             where=accumulator.contact_time > 0.0,
         ),
         "reversals_per_revolution": accumulator.reversals / n_revolution,
@@ -103,28 +99,28 @@ def measures_of(
         "contact_impulse": accumulator.impulse / n_revolution,
         "friction_work": accumulator.friction_work / n_revolution,
         "minimum_slip_speed": np.where(np.isfinite(accumulator.least_slip), accumulator.least_slip, np.nan),
-        "force_over_euler_load": accumulator.peak_force / [stator.euler_load for stator in stators],
-        "tip_deflection_ratio": deflection / [stator.length for stator in stators],
-        "foreshortening_ratio": foreshortening_ratio(
-            stators, deflection, accumulator.peak_force, is_round=is_round
-        ),
         "peak_torsion": float(max(accumulator.highest[TWIST], -accumulator.lowest[TWIST])),
         "peak_to_peak_vertical": float(accumulator.highest[VERTICAL] - accumulator.lowest[VERTICAL]),
         "peak_to_peak_horizontal": float(accumulator.highest[HORIZONTAL] - accumulator.lowest[HORIZONTAL]),
         "energy_residual": float(abs(sum(flows) - (energy[1] - energy[0])) / exchanged),
-        "settled": _settled(verdict, signals, stators[0].radius, samples_per_revolution, is_contact),
+        "settled": _settled(verdict, signals, model, spin, samples_per_revolution, is_contact),
         "contact_iterations": int(accumulator.pivots[0]),
         "contact_residual": float(np.divide(distance, moved, out=np.zeros(3), where=moved > 0.0).max()),
     }
 
 
 def _settled(
-    verdict: Verdict, signals: dict[str, Floats], radius: float, samples_per_revolution: int, is_contact: bool
+    verdict: Verdict,
+    signals: dict[str, Floats],
+    model: Model,
+    spin: float,
+    samples_per_revolution: int,
+    is_contact: bool,
 ) -> int:
-    """Flag of `schema.SETTLED`; `radius` (m) is that of the rim."""
+    """Flag of `schema.SETTLED`."""
     if verdict.repeats or not verdict.is_reached:
         return int(verdict.repeats)
-    rim = radius * signals["torsion"]  # m, as the orbit
+    rim = model.stators[0].radius * signals["torsion"]  # m, as the orbit
     force = signals["contact_force"].reshape(len(signals["contact_force"]), -1, samples_per_revolution)
     return settled(
         np.stack([signals["vertical"], signals["horizontal"], rim]),
@@ -132,23 +128,37 @@ def _settled(
         samples_per_revolution,
         period=verdict.period,
         is_contact=is_contact,
+        others=_others(signals, model, abs(spin), samples_per_revolution),
     )
 
 
-def foreshortening_ratio(
-    stators: tuple[StatorModel, ...], deflection: Floats, force: Floats, *, is_round: bool
-) -> Floats:
-    """Return the change of the gap by bending that the model omits, over the tip's compression, (q,).
-
-    A tip at a lateral `deflection` l (q,), m, draws back by 0.6 l^2 / L, and the rim, r away from its centre,
-    by l^2 / (2 r). A body without a length or a rim has neither. The compression is the static one under the
-    `force` (q,), N; without it the ratio is 0.
-    """
-    ratio = np.zeros(len(stators))
-    for i, stator in enumerate(stators):
-        drawn = 0.6 / stator.length if stator.squared_slope is None else 0.0
-        away = 0.0 if is_round or stator.radius == 0.0 else 0.5 / stator.radius
-        compression = force[i] * stator.axial_compliance if force[i] > 0.0 else 0.0
-        if compression > 0.0:
-            ratio[i] = (drawn + away) * deflection[i] ** 2 / compression
-    return ratio
+def _others(
+    signals: dict[str, Floats], model: Model, spin: float, samples_per_revolution: int
+) -> list[Floats]:
+    """What is to settle besides the motion of the rim: twist, stators and probes."""
+    radius = model.stators[0].radius
+    orbit = math.sqrt(float(signals["vertical"].var() + signals["horizontal"].var()))
+    of_motion = dict(zip(MOTIONS, orbit * spin ** np.arange(3), strict=True))
+    of_twist = dict(
+        zip(TWISTS, orbit / radius * spin ** np.arange(3) if radius > 0.0 else np.zeros(3), strict=True)
+    )
+    scale = of_motion | of_twist
+    rate = np.gradient(signals["torsion"]) * (spin * samples_per_revolution / (2.0 * np.pi))
+    heard_of = [
+        ("displacement", signals["stator_axial"]),
+        ("displacement", signals["stator_lateral"]),
+        ("twist", signals["torsion"][np.newaxis]),
+        ("twist_rate", rate[np.newaxis]),
+        ("twist_acceleration", signals["torsion_acceleration"][np.newaxis]),
+    ]
+    probes = () if model.probe is None else model.probe.probes
+    heard_of += [(probe.quantity, signals[f"{PROBE}{probe.name}"][np.newaxis]) for probe in probes]
+    return [
+        heard(
+            signal,
+            samples_per_revolution,
+            NEGLIGIBLE * float(scale.get(quantity, 0.0)),
+            jumps=quantity not in (*MOTIONS[:2], *TWISTS[:2]),
+        )
+        for quantity, signal in heard_of
+    ]

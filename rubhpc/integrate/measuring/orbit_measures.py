@@ -45,17 +45,18 @@ def period(vertical: Floats, horizontal: Floats, samples_per_revolution: int) ->
     return 0
 
 
-def ends_change(cycles: Floats, period: int) -> float:
-    """Root mean square distance of the first cycles from the last ones a whole number of periods later.
+def ends_change(cycles: Floats, period: int) -> Floats:
+    """Root mean square distance of the first cycles from the last ones whole periods later, (...).
 
     Parameters
     ----------
-    cycles : (n_revolution, n)
+    cycles : (..., n_revolution, n)
         The distance of two is their Euclidean one.
     """
-    shift = period * ((len(cycles) - 1) // period)
-    change = cycles[shift:] - cycles[: len(cycles) - shift]
-    return math.sqrt((change**2).sum() / len(change))
+    n = cycles.shape[-2]
+    shift = period * ((n - 1) // period)
+    change = cycles[..., shift:, :] - cycles[..., : n - shift, :]
+    return np.asarray(np.sqrt((change**2).sum(axis=(-2, -1)) / (n - shift)))
 
 
 def whirl_ratio(vertical: Floats, horizontal: Floats, samples_per_revolution: int, spin: float) -> float:

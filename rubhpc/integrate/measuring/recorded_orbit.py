@@ -66,7 +66,7 @@ class RecordedOrbit:
     def has_equal_ends(self, period: int, tolerance: float = PERIOD_TOLERANCE) -> bool:
         """Whether the first cycles equal the last ones a whole number of periods later."""
         change = ends_change(self.cycles.reshape(self.n_revolution, -1), period)
-        return change <= tolerance * self.size * math.sqrt(self.cycles.shape[2])
+        return bool(change <= tolerance * self.size * math.sqrt(self.cycles.shape[2]))
 
     def repeats(self, period: int) -> bool:
         """Whether its cycles are the same a period later and at both ends."""

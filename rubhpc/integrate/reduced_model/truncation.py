@@ -157,7 +157,7 @@ def ringing_of(model: Model, spin: float, touch: Touch) -> Ringing:
     signals = [mode[row] for row in output_degrees(model) if row >= 0]
     twist_row = output_degrees(model)[TWIST]
     turned = mode[twist_row] if twist_row >= 0 else np.zeros(frequency.size)
-    displaced, moving, accelerated = model.probe_rows @ mode
+    displaced, moving, accelerated = model.sensor_rows @ mode
     lively = np.vstack(  # torsional acceleration and probes: reading of each for a unit of the mode
         [turned * frequency**2, np.hypot(displaced - accelerated * frequency**2, moving * frequency)]
     )

@@ -7,7 +7,7 @@ import pytest
 
 from rubhpc import simulate
 from rubhpc.integrate.measuring.orbit_measures import period
-from rubhpc.integrate.measuring.settling import BLOCK, UNKNOWN, halves, is_steady, settled
+from rubhpc.integrate.measuring.settling import BLOCK, UNKNOWN, halves, heard, is_steady, settled
 
 SAMPLES, REVOLUTIONS = 32, 64
 TURN = 2 * math.pi * np.arange(REVOLUTIONS * SAMPLES) / SAMPLES
@@ -34,14 +34,19 @@ def logistic(rate, start, n=REVOLUTIONS):
     return np.array(sizes[-n:])
 
 
-def of(whirl, *, torsion=None, impulse=None, is_contact=True):
+def of(whirl, *, torsion=None, impulse=None, is_contact=True, others=()):
     """Flag of an orbit, with as steady an impulse as its amplitude is."""
     n = whirl.size // SAMPLES
     if impulse is None:
         impulse = np.abs(whirl).reshape(n, SAMPLES).mean(axis=1)[np.newaxis]
     motion = np.stack([whirl.real, whirl.imag, np.zeros(whirl.size) if torsion is None else torsion])
     return settled(
-        motion, impulse, SAMPLES, period=period(whirl.real, whirl.imag, SAMPLES), is_contact=is_contact
+        motion,
+        impulse,
+        SAMPLES,
+        period=period(whirl.real, whirl.imag, SAMPLES),
+        is_contact=is_contact,
+        others=others,
     )
 
 
@@ -88,6 +93,28 @@ def test_torsion_and_impulse_count_as_the_orbit_does():
     assert of(CIRCLE, impulse=np.stack([np.ones(REVOLUTIONS), 1 + fading])) == 0
     begins = (AGE[::SAMPLES] >= REVOLUTIONS / 2).astype(float)  # a contact in the second half alone
     assert of(STEADY["torus"], impulse=begins[np.newaxis]) == 0
+
+
+@pytest.mark.parametrize("jumps", [False, True])
+def test_every_signal_counts_on_its_own_scale(jumps):
+    """Ringing above 1X in a signal far smaller than the orbit; in 64 revolutions it halves."""
+    rings, forced = np.sin(math.sqrt(2.0) * TURN), np.sin(TURN)
+    for size, least, expected in ((1e-3, 1e-4, 0), (1e-6, 1e-4, 1), (1e-12, 0.0, 0)):
+        fading = size * (0.2 * forced + decay(64) * rings)[np.newaxis]
+        assert of(CIRCLE, others=[heard(fading, SAMPLES, least, jumps=jumps)]) == expected
+        assert of(STEADY["torus"], others=[heard(fading, SAMPLES, least, jumps=jumps)]) == expected
+        lasting = size * (forced + rings)[np.newaxis]
+        assert of(CIRCLE, others=[heard(lasting, SAMPLES, least, jumps=jumps)]) == 1
+    offset = 1.0 + 1e-5 * decay(10)[np.newaxis]  # a small share of the largest value
+    assert of(CIRCLE, others=[heard(offset, SAMPLES, 0.0, jumps=jumps)]) == 1
+
+
+def test_a_torsion_that_still_rings_has_not_settled():
+    """Its orbit repeats within 1 %, while the torsion changes by 11 % in the record."""
+    case = {"speed_ratio": 6.0, "clearance_ratio": 0.97, "samples_per_revolution": 128, "keep": ()}
+    found = [simulate("mokhtar2017", transient=n, **case) for n in (120, 1000)]
+    assert [record.period for record in found] == [1, 1]
+    assert [record.settled for record in found] == [0, 1]
 
 
 def test_without_contact_only_a_periodic_motion_has_settled():
