@@ -76,8 +76,8 @@ def decay_message(cases: Iterable[tuple[Model, float]]) -> str:
             if lasts > slowest:
                 slowest, n = lasts, math.ceil(lasts)
                 text = (
-                    f"at {abs(spin) * 30.0 / math.pi:.6g} rpm the {mode.kind} mode of {mode.frequency:.4g} Hz "
-                    f"of {name}, damping {mode.damping_ratio:.2g}, decays slowest: by half in "
+                    f"at {abs(spin) * 30.0 / math.pi:.6g} rpm the {mode.kind} mode of {mode.frequency:.4g} "
+                    f"Hz of {name}, damping {mode.damping_ratio:.2g}, decays slowest: by half in "
                     f"{lasts * math.log(2.0) / LEFT:.3g} revolutions, to 1 % in {n}, "
                     f"which needs transient = {n}"
                 )
