@@ -194,6 +194,12 @@ class CaseGrid:
         points = self.points.within(block.start, block.shape)
         return [self._ids(point) for point in points]
 
+    @property
+    def setup_dims(self) -> tuple[list[int], list[int]]:
+        """Dimensions along which cases share no set-up, and that of the friction."""
+        points = self._operating_points
+        return [*points.costly_dims, *points.drive_dims], points.friction_dims
+
     def with_each_law(self, index: Sequence[int]) -> list[Case]:
         """Return the case at an index, and those that differ from it in nothing but laws of contact."""
         return [self.case(at) for at in self._operating_points.with_each_law(tuple(index))]

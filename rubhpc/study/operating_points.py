@@ -65,6 +65,8 @@ class OperatingPoints:
         Whether clearances are given as shares of the contact-free amplitude.
     costly_dims : list of int
         The dimensions along which speed, rig or contact change: cases that differ there share no setup.
+    friction_dims, drive_dims : list of int
+        The dimension of the friction, and those of what drives a rotor.
     is_checked : bool
         Whether `point_checks.check_points` has found nothing wrong with them.
     rig_axes, response_axes : list of int
@@ -96,6 +98,7 @@ class OperatingPoints:
         self.response_axes = sorted(rotor_axes + node_axes)
         self._speed_setters = [*(rotor_axes if self._is_speed_ratio else ()), self._speed_axis]
         self.costly_dims = self.dims(self._speed_axis, *self.rig_axes, *self._contact_axes)
+        self.friction_dims, self.drive_dims = self.dims(self._friction_axis), self.dims(*self._drive_axes)
         # Cached by value, not by index: of axes that share a dimension only some may matter here.
         self._rig_at = lru_cache(maxsize=256)(self._make_rig)
         self._contact_at = lru_cache(maxsize=4096)(self._make_contact)
