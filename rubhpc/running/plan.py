@@ -84,6 +84,8 @@ class Plan:
         The cases that were timed.
     mostly : str
         What takes most of the time, and what would help; "" where nothing does.
+    failures : tuple of str
+        Coordinates of the timed cases that failed, and why.
     ranges : tuple of str
         Range of each axis.
     warnings : tuple of str
@@ -115,6 +117,7 @@ class Plan:
     spent: float = 0.0
     memory: float = 0.0
     mostly: str = ""
+    failures: tuple[str, ...] = ()
     ranges: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     part: str = ""
@@ -209,7 +212,7 @@ class Plan:
                 f"to compute  {self.steps:.3g} steps, {cost}",
                 *self._timed,
                 *([f"mostly      {self.mostly}"] if self.mostly else []),
-                *(f"failed      a timed case: {text}" for _, text in self.sample.failures),
+                *(f"failed      a timed case: {text}" for text in self.failures),
                 *(f"warning     {text}" for text in self.warnings),
             ]
         )
@@ -331,6 +334,10 @@ def make_plan(study: Study, part: str | None = None, say: Callable[[str], None] 
         sample=sample,
         spent=time.process_time() - began_timing - sample.loading,
         mostly=mostly,
+        failures=tuple(
+            f"{manifest.name_case(int(np.ravel_multi_index(index, grid.shape)))}: {text}"
+            for index, text in sample.failures
+        ),
         memory=memory if sample.cases else 0.0,
         ranges=ranges,
         warnings=warnings,

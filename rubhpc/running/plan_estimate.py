@@ -45,11 +45,12 @@ def estimate(cases: list[Timed], n_case: int, steps: float) -> Estimate:
 
     Times are proportional to predicted steps on average: the ratio of the sums of both. The range has the
     error of that ratio, by Student's distribution of its logarithm, and the least and most time of cases that
-    were cut.
+    were cut. A case of whose rest nothing is known counts only if there is no other.
     """
     if not cases:
         return Estimate(math.nan, math.nan, math.nan)
     known = sum(case.spent for case in cases)
+    cases = [case for case in cases if case.most < math.inf] or cases
     timed = np.array(
         [[case.spent + case.least, case.spent + case.rest, case.spent + case.most] for case in cases]
     )

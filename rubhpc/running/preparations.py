@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from rubhpc.study.cases import CaseGrid
 
-    Index = tuple[int, ...]
-
 _STRETCHES, _MOST_COUNTED = 10, 2_000  # parts of a run, and cases in all, in which preparations are counted
 
 
@@ -45,8 +43,7 @@ def count_preparations(grid: CaseGrid, missing: NDArray[np.bool_]) -> Preparatio
     sequences = [sequence for sequence in sequences if sequence]
     n_missing, counted, found = int(missing.sum()), 0, np.zeros(2)
     n_stretch = _STRETCHES if n_missing > _MOST_COUNTED else 1
-    kept: OrderedDict[Index, set[Index]] = OrderedDict()  # frictions of each set-up
-    costly, friction = grid.setup_dims
+    kept: OrderedDict[tuple[float, ...], set[float]] = OrderedDict()  # frictions of each set-up
     for part in np.array_split(np.arange(len(sequences)), min(n_stretch, len(sequences) or 1)):
         n_here = 0
         for block in (block for k in part.tolist() for block in sequences[k]):
@@ -54,13 +51,13 @@ def count_preparations(grid: CaseGrid, missing: NDArray[np.bool_]) -> Preparatio
                 break
             window = tuple(slice(s, s + n) for s, n in zip(block.start, block.shape, strict=True))
             for place in np.argwhere(missing[window]) + np.array(block.start):
-                key, mu = (tuple(place[dims].tolist()) for dims in (costly, friction))
+                key, friction = grid.setup_values(place.tolist())
                 found[0] += key not in kept
                 frictions = kept.setdefault(key, set())
                 if len(kept) > MOST_SETUPS:
                     kept.popitem(last=False)
-                found[1] += mu not in frictions
-                frictions.add(mu)
+                found[1] += friction not in frictions
+                frictions.add(friction)
                 n_here += 1
         counted += n_here
     return Preparations(*(n_missing / max(counted, 1) * found).tolist())
