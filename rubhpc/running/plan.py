@@ -43,8 +43,7 @@ _LINE = 400  # bytes of a case in a journal, about, for one stator
 _OWN_COORDINATES = 9  # of the dimensions after the axes, the stators and the settings
 _SECONDS, _LEAST = 13.0, 4.0  # wall time of all, and of timing at least
 _FOR_CASES = 0.5  # of it in a refined map; the rest is for lines
-_FOR_HALF = 3.0  # s of it, to time half of many stators
-_LONG = 600.0  # s: of a longer study it is said what would help
+_FOR_HALF, _MANY, _LONG = 3.0, 4, 600.0  # s of it to time half of so many stators, if all takes so many s
 _AT_EDGES = 1.1  # seconds per step of cases that a refined map computes, over that of all cases, about
 _AGREED = 1.06  # most over least time, up to which no range is given
 _FEW = 3  # cases, which may all miss the main cost
@@ -272,7 +271,7 @@ def make_plan(study: Study, part: str | None = None, say: Callable[[str], None] 
     def steps_at(index: tuple[int, ...]) -> float:
         return steps_of[tuple(i - i % n for i, n in zip(index, grid.chunk, strict=True))]
 
-    timer = CaseTimer(grid, for_cases - (_FOR_HALF if len(study.rig.stator) > 1 else 0.0))
+    timer = CaseTimer(grid, for_cases - (_FOR_HALF if len(study.rig.stator) >= _MANY else 0.0))
     sample = timer.time_cases(missing, steps_at, say) if left else timer.sample
     steps, n_expected, share, off = all_steps, None, 1.0, 0.0
     if refinement is not None:
@@ -294,6 +293,11 @@ def make_plan(study: Study, part: str | None = None, say: Callable[[str], None] 
         )
         found = cost.estimate()
         bound, mostly = found.seconds, cost.mostly(study)
+        n_stator = len(study.rig.stator)
+        if n_stator >= _MANY and found.seconds > _LONG and not study.rig.carrier:
+            half = timer.time_half(_FOR_HALF)
+            advice = f"with half of the {n_stator} stators a case took {half:.2g} of the time"
+            mostly = "; ".join(filter(None, (mostly, advice * math.isfinite(half))))
         if refinement is not None:
             some = replace(
                 cost,

@@ -43,6 +43,7 @@ _MOST_CASES, _FEW = (
 )  # cases; so many share the time, of which one that is short leaves the rest to others
 _ALL = 24  # cases: of a study of up to so many all are begun
 _ENOUGH, _AGREED = 3.0, 0.15  # s after which no more cases are begun if their mean is known so well
+_LEAST = 1.5  # s of processor time for cases, on a busy machine
 _LEAST_EACH, _LATE = (
     0.5,
     0.2,
@@ -93,12 +94,16 @@ class CaseTimer:
         self._end = end - seconds_compiling()
         self._ready: set[Contact] = set()
         self._setups = KeptSetups(grid.study)
+        self._begun: float | None = None  # processor time when the first case began
+        self._latest: tuple[Case, Timed] | None = None
         self.sample = Sample()
 
     @property
     def left(self) -> float:
-        """Seconds that are left."""
-        return self._end + seconds_compiling() - time.monotonic()
+        """Seconds that are left, of processor time at least `_LEAST` from the first case on."""
+        begun = math.inf if self._begun is None else self._begun
+        least = min(begun - time.process_time(), 0.0) + _LEAST
+        return max(self._end + seconds_compiling() - time.monotonic(), least)
 
     @contextmanager
     def _alarm(self) -> Iterator[None]:
@@ -143,6 +148,22 @@ class CaseTimer:
                 sample.failures.append((index, f"{type(error).__name__}: {' '.join(str(error).split())}"))
         return sample
 
+    def time_half(self, seconds: float) -> float:
+        """Time of the latest case with every second stator over that with all, NaN where it is not known.
+
+        It takes so many seconds more, at most.
+        """
+        if self._latest is None or any(probe.stator for probe in self._study.recording.probe):
+            return math.nan
+        (case, whole), self._setups = self._latest, KeptSetups(self._study)
+        self._end = time.monotonic() + seconds - seconds_compiling()
+        fewer = replace(case, rig=replace(case.rig, stator=case.rig.stator[::2]))
+        with suppress(Enough, Exception), self._alarm():
+            half = self._time(fewer, whole.steps, math.inf)
+            if half.most < math.inf and whole.most < math.inf:
+                return (half.spent + half.rest) / (whole.spent + whole.rest)
+        return math.nan
+
     def _add(self, index: Index, steps: float, limit: float, missing: NDArray[np.bool_]) -> None:
         if memory() > 0.5 * MOST_BYTES:
             self._setups = KeptSetups(self._study)
@@ -151,8 +172,10 @@ class CaseTimer:
         began_at = time.process_time() - began
         self._load_kernels(case)
         self.sample.memory = self.sample.memory or peak_memory()
+        self._begun = self._begun or time.process_time()
         timed = self._time(case, steps, limit)
         timed = replace(timed, speed=timed.speed + began_at)
+        self._latest = case, timed
         alike = self._alike(case) if timed.n_mode and timed.is_whole else None
         if alike is not None and self.left > timed.spent:  # with the same contact modes
             again = self._time(alike, steps, limit)
@@ -196,13 +219,13 @@ class CaseTimer:
 
     def _limit(self, seconds: float) -> Callable[[], None]:
         """Check that ends a case after so many seconds, or for its memory."""
-        end = time.monotonic() + min(seconds, self.left) - seconds_compiling()
+        end = time.monotonic() + seconds - seconds_compiling()
 
         def check() -> None:
             if memory() > MOST_BYTES:
                 self.sample.was_full = True
                 raise Enough
-            if time.monotonic() > end + seconds_compiling():
+            if self.left <= 0.0 or time.monotonic() > end + seconds_compiling():
                 raise Enough
 
         return check
