@@ -123,8 +123,8 @@ def _reproduce(study: Path, output: Path | None, name: str, *, trust_rig: bool) 
 def plan(study: Path, output: Path | None, trust_rig: bool, part: str | None) -> int:
     """Estimate the cost of STUDY.toml and show what is done; writes nothing.
 
-    Core-hours come from cases spread over all axes, timed on this machine for a few seconds and scaled by the
-    predicted steps.
+    Core-hours come from cases spread over all axes, timed on this machine for some 15 s at most and scaled by
+    the predicted steps. Long cases are cut, and the rest of them is extrapolated.
     """
     from rubhpc.running.plan import make_plan
     from rubhpc.running.progress import one_line
@@ -132,7 +132,7 @@ def plan(study: Path, output: Path | None, trust_rig: bool, part: str | None) ->
 
     with one_line() as say:
         found = make_plan(read_study(study, output, trust_rig=trust_rig), part, say)
-    start_up = time.process_time() - found.timing.seconds  # what this process and a run have in common
+    start_up = time.process_time() - found.spent  # what this process and a run have in common
     click.echo(replace(found, start_up=_WHOLE_START * start_up).text())
     return 0
 

@@ -95,6 +95,7 @@ def run_case(
     initial: State | Initial | None = None,
     check: Callable[[], None] | None = None,
     say: Callable[[str], None] = lambda _: None,
+    note: Callable[[float], None] = lambda _: None,
 ) -> Record:
     """Integrate one case and measure it.
 
@@ -111,7 +112,10 @@ def run_case(
         Called between kernel calls, a quarter of a second apart at most; what it raises ends the case.
     say : callable
         Called with the progress of the case as often as `check`, if that is given.
+    note : callable
+        Called before each `check` with the share of transient and record that is done; 1 after the record.
     """
+    n_whole = recording.longest_transient + recording.revolutions
     began = time.perf_counter() - seconds_compiling()
     compile_ahead(setup)
     if isinstance(initial, State):
@@ -123,8 +127,10 @@ def run_case(
         def start(state: State) -> March:
             def look() -> None:
                 assert check is not None
+                revolution = march.sample / setup.samples_per_revolution
+                note((recording.longest_transient + revolution) / n_whole)
                 check()
-                say(reached(march.sample / setup.samples_per_revolution))
+                say(reached(revolution))
 
             march = march_of(scheme, setup)(
                 setup, clearance, friction, state, None if check is None else look

@@ -41,6 +41,11 @@ def seconds_compiling() -> float:
     return compilation.seconds
 
 
+def is_compiling() -> bool:
+    """Whether this process is compiling now."""
+    return _uncollected.depth > 0
+
+
 def expect_sets(names: set[str]) -> None:
     """Take the sets of kernels that a run may need, for announcements that count them."""
     _expected.update(names)
@@ -90,20 +95,21 @@ class _Uncollected(event.Listener):
     """
 
     def __init__(self) -> None:
-        self._depth, self._was_enabled = 0, False
+        self.depth, self._was_enabled = 0, False
 
     def on_start(self, event: Any) -> None:
-        if self._depth == 0:
+        if self.depth == 0:
             self._was_enabled = gc.isenabled()
             gc.disable()
-        self._depth += 1
+        self.depth += 1
 
     def on_end(self, event: Any) -> None:
-        self._depth -= 1
-        if self._depth == 0 and self._was_enabled:
+        self.depth -= 1
+        if self.depth == 0 and self._was_enabled:
             gc.freeze()
             gc.enable()
 
 
-event.register("numba:compile", _Uncollected())  # type: ignore[no-untyped-call]
+_uncollected = _Uncollected()
+event.register("numba:compile", _uncollected)  # type: ignore[no-untyped-call]
 announce_by(to_stderr)

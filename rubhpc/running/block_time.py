@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from rubhpc.storage.manifest import Manifest
 
-_MOST = 8  # of the first blocks, that are written
+_MOST, _LONGEST = 8, 0.5  # of the first blocks, that are written, and s after which no more are
 
 
 def time_block(manifest: Manifest, arrays: dict[str, NDArray[Any]]) -> float:
@@ -35,7 +35,7 @@ def time_block(manifest: Manifest, arrays: dict[str, NDArray[Any]]) -> float:
         extent = manifest.extent(variable)
         case = np.resize(arrays.get(variable.name, np.zeros(1)), extent).astype(variable.dtype)
         data[variable.name] = np.broadcast_to(case, (n_case, *extent)).copy()
-    taken = []
+    taken, end = [], time.monotonic() + _LONGEST
     try:
         with tempfile.TemporaryDirectory() as folder:
             files = BlockFiles(Path(folder), manifest)
@@ -50,6 +50,8 @@ def time_block(manifest: Manifest, arrays: dict[str, NDArray[Any]]) -> float:
                     write_whole(path, layout.encode(values), is_synced=False)
                     flush_to_disk(path)
                 taken.append(time.process_time() - began)
+                if time.monotonic() > end:
+                    break
     except OSError:  # the disk is full, or there is no folder
         return 0.0
     return float(np.mean(taken))

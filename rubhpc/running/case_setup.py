@@ -35,14 +35,19 @@ def set_up(study: Study, case: Case, model: Model | None = None) -> Setup:
 
 
 def set_up_for_kernels(study: Study, case: Case) -> Setup:
-    """Set-up that calls the kernels of this case at little cost, with the first stators of a ring.
+    """Set-up that calls the kernels of this case at little cost (`case_for_kernels`)."""
+    return set_up(study, case_for_kernels(study, case))
+
+
+def case_for_kernels(study: Study, case: Case) -> Case:
+    """The case with the first stators of a ring, which calls the same kernels at little cost.
 
     Even two revolutions in a large ring may take as long as kernels take to load, for its contact modes.
     """
     probed = (probe.stator or 0 for probe in study.recording.probe)
-    if not case.rig.carrier and max(probed, default=0) <= _ENOUGH_STATORS:
-        case = replace(case, rig=replace(case.rig, stator=case.rig.stator[:_ENOUGH_STATORS]))
-    return set_up(study, case)
+    if case.rig.carrier or max(probed, default=0) > _ENOUGH_STATORS:
+        return case
+    return replace(case, rig=replace(case.rig, stator=case.rig.stator[:_ENOUGH_STATORS]))
 
 
 def operation_of(grid: CaseGrid, case: Case) -> Operation:

@@ -1,4 +1,4 @@
-"""Memory of this process at its peak."""
+"""Memory of this process, at its peak and now."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 _STATUS = Path("/proc/self/status")
-_MACHINE = Path("/proc/meminfo")
+_NOW = "VmRSS:"
 _PEAK = "VmHWM:"  # of the program itself: getrusage includes the process that started it
 
 
@@ -20,9 +20,9 @@ def peak_memory() -> float:
         return getrusage(RUSAGE_SELF).ru_maxrss * (1.0 if sys.platform == "darwin" else 1024.0)
 
 
-def free_memory() -> float:
-    """Free memory of this machine, bytes; 0 where that is unknown."""
+def memory() -> float:
+    """Memory of this process now, bytes; its peak where that is unknown."""
     try:
-        return 1024.0 * float(_MACHINE.read_text().split("MemAvailable:")[1].split()[0])
+        return 1024.0 * float(_STATUS.read_text().split(_NOW)[1].split()[0])
     except (OSError, IndexError, ValueError):
-        return 0.0
+        return peak_memory()

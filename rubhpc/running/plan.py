@@ -1,4 +1,4 @@
-"""The cost and progress of a study: cases are counted, and a few pilot cases are timed."""
+"""The cost and progress of a study: cases are counted, and a few of them are timed."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rubhpc.running.block_time import time_block
 from rubhpc.running.kept_setups import MOST_BYTES, MOST_SETUPS
 from rubhpc.running.memory import peak_memory
-from rubhpc.running.pilot_estimate import within
-from rubhpc.running.pilots import Timing, seconds_of, time_pilots
+from rubhpc.running.plan_estimate import Cost, Estimate, percent
 from rubhpc.running.preparations import count_preparations, touched
 from rubhpc.running.refined_lines import expected_cases
+from rubhpc.running.timed_cases import CaseTimer
 from rubhpc.schema import DIVERGED, DONE, FAILED, INFERRED, MISSING, STATUS
 from rubhpc.storage.duration import duration, span
 from rubhpc.storage.growth import origins
@@ -35,12 +36,16 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from rubhpc.running.preparations import Preparations
+    from rubhpc.running.timed_cases import Sample
     from rubhpc.study.study import Study
 
 _LINE = 400  # bytes of a case in a journal, about, for one stator
 _OWN_COORDINATES = 9  # of the dimensions after the axes, the stators and the settings
+_SECONDS, _LEAST = 13.0, 4.0  # wall time of all, and of timing at least
+_FOR_CASES = 0.5  # of it in a refined map; the rest is for lines
+_FOR_HALF, _MANY, _LONG = 3.0, 4, 600.0  # s of it to time half of so many stators, if all takes so many s
 _AT_EDGES = 1.1  # seconds per step of cases that a refined map computes, over that of all cases, about
-_AGREED = 0.03  # standard error of the time, as a share of it, up to which no range is given
+_AGREED = 1.06  # most over least time, up to which no range is given
 _FEW = 3  # cases, which may all miss the main cost
 _ROOM = 1.15  # memory for contact modes over what their tables and parts hold (1.04 to 1.12, rings of 16)
 _LEDGERS = 2  # copies of the measures of all cases while they are packed, about
@@ -64,14 +69,22 @@ class Plan:
     steps : int
         Predicted integration steps of what is missing.
     core_hours : float
-        For what is missing, from the pilot cases; NaN where they failed.
+        For what is missing, from the timed cases; NaN where they failed.
+    least, most : float
+        Range of `core_hours`; `most` is infinite where a case was cut before its first revolution.
     start_up : float
         Approximate processor seconds of the start and end of each process, which are not in `core_hours`; 0
         where that is unknown.
+    spent : float
+        Processor seconds of the timing, without loading kernels, which a run needs too.
     memory : float
         Approximate peak memory of a process, bytes; 0 where no case was timed.
-    timing : Timing
-        What the pilot cases have shown.
+    sample : Sample
+        The cases that were timed.
+    mostly : str
+        What takes most of the time, and what would help; "" where nothing does.
+    failures : tuple of str
+        Coordinates of the timed cases that failed, and why.
     ranges : tuple of str
         Range of each axis.
     decay : str
@@ -98,9 +111,14 @@ class Plan:
     n_byte: int
     steps: int
     core_hours: float
-    timing: Timing
+    least: float
+    most: float
+    sample: Sample
     start_up: float = 0.0
+    spent: float = 0.0
     memory: float = 0.0
+    mostly: str = ""
+    failures: tuple[str, ...] = ()
     ranges: tuple[str, ...] = ()
     decay: str = ""
     warnings: tuple[str, ...] = ()
@@ -120,26 +138,29 @@ class Plan:
     @property
     def _timed(self) -> list[str]:
         """Number of timed cases, and how well they represent the others."""
-        timing = self.timing
-        if not timing.n_pilot:
+        cases = self.sample.cases
+        if not cases:
             return []
-        note = ""
-        if timing.n_pilot == self.counts[MISSING]:
-            note = ", all missing ones"
-        elif self._range:
-            few = "are few and differ" if timing.n_pilot <= _FEW else "differ"
-            share = "two plans in three" if timing.n_pilot <= _FEW else "eight to nine plans in ten"
-            note = f"; they {few}: such a range contains the time in {share}"
-        return [f"timed       {timing.n_pilot} case{'s' * (timing.n_pilot > 1)}{note}"]
+        n, cut = len(cases), [case for case in cases if not case.is_whole]
+        texts = [f"timed       {n} case{'s' * (n > 1)}" + ", all missing ones" * (n == self.counts[MISSING])]
+        if cut:
+            shares = [case.share for case in cut if case.share > 0.0]
+            ends = dict.fromkeys(percent(share) for share in (min(shares), max(shares))) if shares else ()
+            known = f" at {' to '.join(ends)} of it" if ends else ""
+            memory = " or memory" * self.sample.was_full
+            texts.append(f"{len(cut)} cut for time{memory}{known}, the rest extrapolated")
+        if self._range and n < self.counts[MISSING]:
+            few = "are few and differ" if n <= _FEW else "differ"
+            share = "two plans in three" if n <= _FEW else "eight to nine plans in ten"
+            texts.append(f"they {few}: such a range contains the time in {share}")
+        return ["; ".join(texts)]
 
     @property
     def _range(self) -> str:
         """Range of the time as text; "" where cases agree or nothing is known."""
-        timing, seconds = self.timing, 3600.0 * self.core_hours
-        if timing.is_bound or not _AGREED * self._whole < timing.spread * seconds < math.inf:
+        if not self.most < math.inf or self.most <= _AGREED * self.least:
             return ""
-        least, most = within(seconds, timing.spread * seconds, timing.n_pilot, timing.known)
-        return span(least + self.start_up, most + self.start_up)
+        return span(3600.0 * self.least + self.start_up, 3600.0 * self.most + self.start_up)
 
     @property
     def _whole(self) -> float:
@@ -158,14 +179,15 @@ class Plan:
         n_case = math.prod(self.shape.values())
         sizes = " x ".join(f"{n} {name}" for name, n in self.shape.items())
         cost = (
-            f"{'at least ' * self.timing.is_bound}{self._whole / 3600:.3g} core-hours "
+            f"{'at least ' * math.isinf(self.most)}{self._whole / 3600:.3g} core-hours "
             f"({self._range or duration(self._whole)} on one core)"
             if math.isfinite(self.core_hours)
-            else "core-hours unknown: the pilot cases failed"
+            else "core-hours unknown: "
+            + ("the timed cases failed" if self.sample.failures else "no case could begin in time")
         )
         if self.start_up > 0.0 and self.counts[MISSING]:
             cost += f", including {self.start_up:.1f} s to start a process"
-        compiled = "; includes compilation, less from now on" if self.timing.has_compiled else ""
+        compiled = "; includes compilation, less from now on" if self.sample.has_compiled else ""
         return "\n".join(
             [
                 f"{self.title} -> {self.store}",
@@ -191,7 +213,8 @@ class Plan:
                 ),
                 f"to compute  {self.steps:.3g} steps, {cost}",
                 *self._timed,
-                *(f"failed      a pilot case: {text}" for text in self.timing.failures),
+                *([f"mostly      {self.mostly}"] if self.mostly else []),
+                *(f"failed      a timed case: {text}" for text in self.failures),
                 *([f"decay       {self.decay}"] if self.decay else []),
                 *(f"warning     {text}" for text in self.warnings),
             ]
@@ -200,7 +223,7 @@ class Plan:
 
 @on_one_thread
 def make_plan(study: Study, part: str | None = None, say: Callable[[str], None] = lambda _: None) -> Plan:
-    """Count, look into the store if there is one, and time pilot cases; writes nothing.
+    """Count, look into the store if there is one, and time some cases for some 15 s; writes nothing.
 
     With a part, such as "3/64", its missing cases are counted and timed. `say` receives the progress.
 
@@ -211,6 +234,7 @@ def make_plan(study: Study, part: str | None = None, say: Callable[[str], None] 
     StoreError
         The store at its output is of another study.
     """
+    began = time.monotonic()
     chosen = None if part is None else Part.parse(part)
     if chosen is not None:
         check_parts(chosen, study)
@@ -241,31 +265,54 @@ def make_plan(study: Study, part: str | None = None, say: Callable[[str], None] 
     missing = (is_in_part & (status == MISSING)).reshape(grid.shape)
     left = [(block, share) for block in blocks if (share := missing_share(block, missing))]
     all_steps = sum(block.cost * share for block, share in left)
-    timing = time_pilots(grid, manifest, [block for block, _ in left], missing, say)
-    steps = all_steps
-    n_expected, left_of_all = None, 1.0
+    ranges, warnings = axis_ranges(grid), grid.warnings()
+    began_timing = time.process_time()
+    end = max(began + _SECONDS, time.monotonic() + _LEAST)
+    for_cases = end if refinement is None else time.monotonic() + _FOR_CASES * (end - time.monotonic())
+    n_missing = int(missing.sum())
+    steps_of = {block.start: block.cost / math.prod(block.shape) for block in blocks}
+
+    def steps_at(index: tuple[int, ...]) -> float:
+        return steps_of[tuple(i - i % n for i, n in zip(index, grid.chunk, strict=True))]
+
+    timer = CaseTimer(grid, for_cases - (_FOR_HALF if len(study.rig.stator) >= _MANY else 0.0))
+    sample = timer.time_cases(missing, steps_at, say) if left else timer.sample
+    steps, n_expected, share, off = all_steps, None, 1.0, 0.0
     if refinement is not None:
-        a_case = timing.pace.case + timing.pace.step * all_steps / max(int(missing.sum()), 1)
-        began = time.process_time()
-        expected = expected_cases(refinement, grid, kind, a_case)
-        spent = timing.seconds + time.process_time() - began
+        expected = expected_cases(refinement, grid, kind, end - time.monotonic() if sample.cases else 0.0)
         n_expected = round(expected.n_case)
         n_left = max(expected.n_case - float((refinement.asked().cases.ravel() & known).sum()), 0.0)
-        left_of_all = min(n_left / max(int((~known).sum()), 1), 1.0)
-        steps = left_of_all * all_steps
-        spread = math.hypot(timing.spread, expected.error / max(expected.n_case, 1.0))
-        timing = replace(timing, spread=spread, seconds=spent)
-    seconds = most = memory = 0.0
+        share = min(n_left / max(int((~known).sum()), 1), 1.0)
+        steps = share * all_steps
+        off = expected.error / max(expected.n_case, 1.0)
+    found, bound, mostly, memory = Estimate(0.0, 0.0, 0.0), 0.0, "", 0.0
     if left:
-        prepared = count_preparations(grid, missing)
-        n_case = int(missing.sum())
-        memory = _memory(timing, prepared) + _LEDGERS * grid.n_case * kind.itemsize
-        most = seconds = seconds_of(timing.pace, all_steps, n_case, prepared, len(left))
-        if manifest.refine is not None:
-            pace = timing.pace
-            at_edges = pace._replace(step=_AT_EDGES * pace.step, case=_AT_EDGES * pace.case)
-            some = prepared.for_some(left_of_all, n_case), touched(len(left), left_of_all, n_case)
-            seconds = min(most, seconds_of(at_edges, steps, left_of_all * n_case, *some))
+        cost = Cost(
+            cases=sample.cases,
+            n_case=n_missing,
+            steps=all_steps,
+            prepared=count_preparations(grid, missing),
+            n_block=len(left),
+            block=time_block(manifest, sample.arrays) if sample.arrays else 0.0,
+        )
+        found = cost.estimate()
+        bound, mostly = found.seconds, cost.mostly(study)
+        n_stator = len(study.rig.stator)
+        if n_stator >= _MANY and found.seconds > _LONG and not study.rig.carrier:
+            half = timer.time_half(_FOR_HALF)
+            advice = f"with half of the {n_stator} stators a case took {half:.2g} of the time"
+            mostly = "; ".join(filter(None, (mostly, advice * math.isfinite(half))))
+        if refinement is not None:
+            some = replace(
+                cost,
+                n_case=max(round(share * n_missing), 1),
+                steps=_AT_EDGES * steps,
+                prepared=cost.prepared.for_some(share, n_missing),
+                n_block=touched(len(left), share, n_missing),
+            )
+            found = some.estimate().scaled(1.0, off)
+            found = found._replace(seconds=min(found.seconds, bound))
+        memory = _memory(sample, cost.prepared) + _LEDGERS * grid.n_case * kind.itemsize
     per_case = sum(math.prod(manifest.extent(v)) * np.dtype(v.dtype).itemsize for v in manifest.variables)
     shards = zip(manifest.shape, manifest.shard, strict=False)
     n_shard = math.prod(-(-n // s) for n, s in shards) if manifest.shard else 0
@@ -288,29 +335,38 @@ def make_plan(study: Study, part: str | None = None, say: Callable[[str], None] 
         n_file_running=(n_shard + len(blocks)) * len(manifest.variables) + n_fixed,
         n_byte=grid.n_case * (per_case + 2 * _LINE),
         steps=round(steps),
-        core_hours=seconds / 3600,
-        most_core_hours=most / 3600,
-        timing=timing,
-        memory=memory if timing.n_pilot else 0.0,
-        ranges=axis_ranges(grid),
+        core_hours=found.seconds / 3600,
+        least=found.least / 3600,
+        most=found.most / 3600,
+        most_core_hours=bound / 3600,
+        sample=sample,
+        spent=time.process_time() - began_timing - sample.loading,
+        mostly=mostly,
+        failures=tuple(
+            f"{manifest.name_case(int(np.ravel_multi_index(index, grid.shape)))}: {text}"
+            for index, text in sample.failures
+        ),
+        memory=memory if sample.cases else 0.0,
+        ranges=ranges,
         decay=grid.decay(),
-        warnings=grid.warnings(),
+        warnings=warnings,
         part="" if chosen is None else str(chosen),
         n_expected=n_expected,
     )
 
 
-def _memory(timing: Timing, prepared: Preparations) -> float:
+def _memory(sample: Sample, prepared: Preparations) -> float:
     """Bytes that a process holds at most, but for the measures of all cases.
 
     In a ring those are contact modes: of the longest case, and of set-ups and frictions that are kept beside
     them. Otherwise this process, which has run cases and written a block, has held as much.
     """
-    if not timing.modes:
+    modes = [case.n_byte for case in sample.cases]
+    if not any(modes):
         return peak_memory()
     n_kept = min(prepared.friction, MOST_SETUPS * prepared.friction / max(prepared.speed, 1.0)) - 1.0
-    beside = min(MOST_BYTES, max(n_kept, 0.0) * float(np.mean(timing.modes)))
-    return timing.memory + _ROOM * (max(timing.modes) + beside)
+    beside = min(MOST_BYTES, max(n_kept, 0.0) * float(np.mean(modes)))
+    return sample.memory + _ROOM * (max(modes) + beside)
 
 
 def _size(n_byte: float) -> str:

@@ -1,10 +1,9 @@
-"""Counts, for the plan, how often a run assembles a rig, prepares a speed and solves contact modes."""
+"""Counts, for the plan, how often a run prepares a rig at a speed, and contact modes of a friction."""
 
 from __future__ import annotations
 
-import math
 from collections import OrderedDict
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -14,20 +13,14 @@ from rubhpc.storage.resume import missing_share
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from rubhpc.rig.rig import Rig
-    from rubhpc.study.cases import Block, CaseGrid
-    from rubhpc.study.contact_keys import Contact
+    from rubhpc.study.cases import CaseGrid
 
 _STRETCHES, _MOST_COUNTED = 10, 2_000  # parts of a run, and cases in all, in which preparations are counted
 
-# Rig, speed and contact -> the rig and its frictions.
-_Kept: TypeAlias = "OrderedDict[tuple[int, float, Contact], tuple[Rig, set[float]]]"
-
 
 class Preparations(NamedTuple):
-    """How many times a rank that computes all alone assembles a rig, prepares a speed, and a friction."""
+    """How many times a rank that computes all alone prepares a speed, and a friction."""
 
-    rig: float
     speed: float
     friction: float
 
@@ -48,40 +41,23 @@ def count_preparations(grid: CaseGrid, missing: NDArray[np.bool_]) -> Preparatio
     """
     sequences = [[b for b in sequence if missing_share(b, missing)] for sequence in grid.sequences()]
     sequences = [sequence for sequence in sequences if sequence]
-    sizes = [sum(math.prod(block.shape) for block in sequence) for sequence in sequences]
-    n_stretch = _STRETCHES if sum(sizes) > _MOST_COUNTED else 1
-    counted, found = 0, np.zeros(3)
-    kept: _Kept = OrderedDict()
+    n_missing, counted, found = int(missing.sum()), 0, np.zeros(2)
+    n_stretch = _STRETCHES if n_missing > _MOST_COUNTED else 1
+    kept: OrderedDict[tuple[float, ...], set[float]] = OrderedDict()  # frictions of each set-up
     for part in np.array_split(np.arange(len(sequences)), min(n_stretch, len(sequences) or 1)):
         n_here = 0
-        for k in part.tolist():
-            for block in sequences[k]:
-                n_here += _count_in(grid, block, missing, kept, found)
+        for block in (block for k in part.tolist() for block in sequences[k]):
             if n_stretch > 1 and n_here > _MOST_COUNTED / _STRETCHES:
                 break
+            window = tuple(slice(s, s + n) for s, n in zip(block.start, block.shape, strict=True))
+            for place in np.argwhere(missing[window]) + np.array(block.start):
+                key, friction = grid.setup_values(place.tolist())
+                found[0] += key not in kept
+                frictions = kept.setdefault(key, set())
+                if len(kept) > MOST_SETUPS:
+                    kept.popitem(last=False)
+                found[1] += friction not in frictions
+                frictions.add(friction)
+                n_here += 1
         counted += n_here
-    share = int(missing.sum()) / counted if counted else 0.0
-    return Preparations(*(share * found).tolist())
-
-
-def _count_in(
-    grid: CaseGrid, block: Block, missing: NDArray[np.bool_], kept: _Kept, found: NDArray[np.float64]
-) -> int:
-    """Add to `found` what the missing cases of a block prepare, given what is kept; returns their number."""
-    try:
-        cases = grid.cases(block)
-    except Exception:  # its cases will fail
-        return 0
-    wanted = [cases[i] for i in grid.in_turn(cases) if missing[cases[i].index]]
-    for case in wanted:
-        key = id(case.rig), case.speed, case.contact
-        if key not in kept:
-            found[0] += all(rig is not case.rig for rig, _ in kept.values())
-            found[1] += 1
-            kept[key] = case.rig, set()
-            if len(kept) > MOST_SETUPS:
-                kept.popitem(last=False)
-        frictions = kept[key][1]
-        found[2] += case.friction not in frictions
-        frictions.add(case.friction)
-    return len(wanted)
+    return Preparations(*(n_missing / max(counted, 1) * found).tolist())

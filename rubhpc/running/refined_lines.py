@@ -8,9 +8,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.running.case_rows import packed_measures
 from rubhpc.running.kept_setups import KeptSetups
+from rubhpc.running.memory import memory
 from rubhpc.running.preparations import touched
+from rubhpc.running.timed_cases import MOST_BYTES
 from rubhpc.running.worker import integrate
 from rubhpc.schema import FAILED
 from rubhpc.storage.journal import Entry
@@ -31,7 +34,6 @@ _FEWEST, _MOST = 3, 64  # lines along an axis
 _ALIKE = 16  # as long as all add the same, of which the spread of others is not known
 _PATIENCE = 1.5  # times as long as lines are begun, for the last of them
 _AGREED = 0.08  # standard error of the number of cases, as a share of it, up to which no more are refined
-_FOR_LINES, _LINES = 0.1, (3.0, 20.0)  # of the time predicted, s from and to, for lines
 _OFF = 0.5  # standard error of the usual number of cases, as a share of it (0.5 to 1.9 of them)
 
 
@@ -54,7 +56,7 @@ class OutOfTime(Exception):  # noqa: N818 - ends a line, never seen by users
 
 
 def expected_cases(
-    refinement: Refinement, grid: CaseGrid, kind: np.dtype[np.void], a_case: float
+    refinement: Refinement, grid: CaseGrid, kind: np.dtype[np.void], seconds: float
 ) -> Expected:
     """Return how many cases a refined map computes, about: from lines across it.
 
@@ -64,15 +66,13 @@ def expected_cases(
     ----------
     kind : dtype
         Of a record of measures.
-    a_case : float, s
-        Processor time of a case; NaN where that is not known.
+    seconds : float
+        For lines.
     """
     asked = refinement.asked()
     found = None
-    if asked.edges is None and a_case > 0.0:
-        found = _count_by_lines(
-            grid, refinement, kind, np.clip(_FOR_LINES * a_case * asked.n_expected, *_LINES)
-        )
+    if asked.edges is None and seconds > 0.0:
+        found = _count_by_lines(grid, refinement, kind, seconds)
     if found is None:
         return Expected(asked.n_expected, 0.0 if asked.edges is not None else _OFF * asked.n_expected)
     return found._replace(n_case=max(found.n_case, float(asked.cases.sum())))
@@ -81,12 +81,12 @@ def expected_cases(
 def _count_by_lines(
     grid: CaseGrid, refinement: Refinement, kind: np.dtype[np.void], seconds: float
 ) -> Expected | None:
-    """The same by lines alone, in some processor seconds; None where they do not suffice."""
-    study, end = grid.study, time.process_time() + _PATIENCE * seconds
+    """The same by lines alone, in so many seconds; None where they do not suffice."""
+    study, end = grid.study, time.monotonic() + seconds - seconds_compiling()
     setups = KeptSetups(study)
 
     def check() -> None:
-        if time.process_time() > end:
+        if time.monotonic() > end + seconds_compiling() or memory() > MOST_BYTES:
             raise OutOfTime
 
     def compute(flat: int) -> Entry:
@@ -100,7 +100,7 @@ def _count_by_lines(
         except Exception:  # as in a run, where the reason is kept
             return Entry(flat, "", FAILED)
 
-    return count_on_lines(refinement, compute, seconds)
+    return count_on_lines(refinement, compute, seconds / _PATIENCE, time.monotonic)
 
 
 def count_on_lines(

@@ -207,15 +207,21 @@ def record_of(
     state: NDArray[np.float64] | None,
     check: Callable[[], None] = lambda: None,
     say: Callable[[str], None] = lambda _: None,
+    note: Callable[[float], None] = lambda _: None,
 ) -> Record | BranchRecord | RunUpRecord:
-    """The record of a case of any kind, from a stored state if there is one."""
+    """The record of a case of any kind, from a stored state if there is one; `note` receives what is done.
+
+    This is a share of the case, or the value of the parameter that branches have reached.
+    """
     study = grid.study
     if study.branch is not None:
         axis = study.axis(study.branch.along)
-        return record_branches(operation_of(grid, case), study.branch, axis, study.recording, check, say)
+        return record_branches(
+            operation_of(grid, case), study.branch, axis, study.recording, check, say, note
+        )
     setup = setups.of(case)
     initial = case.initial if state is None else State.unpacked(state, setup.model)
-    return integrate(study, case, setup, initial, check, say)
+    return integrate(study, case, setup, initial, check, say, note)
 
 
 def integrate(
@@ -225,6 +231,7 @@ def integrate(
     initial: State | Initial,
     check: Callable[[], None] | None = None,
     say: Callable[[str], None] = lambda _: None,
+    note: Callable[[float], None] = lambda _: None,
 ) -> Record | RunUpRecord:
     """The record of a case, at its speed or over its speeds; `check` is called several times a second."""
     if case.speed_law is None:
@@ -236,6 +243,7 @@ def integrate(
             initial=initial,
             check=check,
             say=say,
+            note=note,
         )
     return record_run_up(
         setup,
@@ -246,6 +254,7 @@ def integrate(
         initial=initial,
         check=check,
         say=say,
+        note=note,
     )
 
 

@@ -14,7 +14,9 @@ if TYPE_CHECKING:
 
 def axis_ranges(grid: CaseGrid) -> tuple[str, ...]:
     """Range of each axis, as in `speed_ratio 0.9 to 6.1: 1704 to 11550 rpm`; a text each."""
-    points = grid.operating_points()
+    ratios = {name for name in (*SPEED_AXES, *CLEARANCE_AXES) if name.endswith("_ratio")}
+    has_ratio = any(axis.name in ratios for axis in grid.study.axes)
+    points = grid.operating_points() if has_ratio else {}  # those of many speeds take long
     texts = []
     for axis in grid.study.axes:
         text = f"{axis.name} {_values(axis)}"
@@ -22,7 +24,7 @@ def axis_ranges(grid: CaseGrid) -> tuple[str, ...]:
             (SPEED_AXES, "spin_speed", "rad s-1"),
             (CLEARANCE_AXES, "clearance", "m"),
         ):
-            if axis.name in names and axis.name.endswith("_ratio"):
+            if axis.name in ratios.intersection(names):
                 values = points[variable][1]
                 text += f": {_range(float(values.min()), float(values.max()), unit)}"
         texts.append(text)

@@ -194,6 +194,11 @@ class CaseGrid:
         points = self.points.within(block.start, block.shape)
         return [self._ids(point) for point in points]
 
+    def setup_values(self, index: Sequence[int]) -> tuple[tuple[float, ...], float]:
+        """Values on the axes that set the set-up of a case, and its friction: cases may share them."""
+        values, points = self.points.at(index), self._operating_points
+        return tuple([values[i] for i in points.setup_axes]), values[points.friction_axis]
+
     def with_each_law(self, index: Sequence[int]) -> list[Case]:
         """Return the case at an index, and those that differ from it in nothing but laws of contact."""
         return [self.case(at) for at in self._operating_points.with_each_law(tuple(index))]

@@ -65,6 +65,9 @@ class OperatingPoints:
         Whether clearances are given as shares of the contact-free amplitude.
     costly_dims : list of int
         The dimensions along which speed, rig or contact change: cases that differ there share no setup.
+    setup_axes : list of int
+        Axes that set the set-up of a case, which those of the same values share.
+    friction_axis : int
     is_checked : bool
         Whether `point_checks.check_points` has found nothing wrong with them.
     rig_axes, response_axes : list of int
@@ -77,7 +80,7 @@ class OperatingPoints:
         self.is_checked = False
         self._values = [axis.values for axis in study.axes]
         names = [axis.name for axis in study.axes]
-        self._speed_axis, self._clearance_axis, self._friction_axis = (
+        self._speed_axis, self._clearance_axis, self.friction_axis = (
             next(i for i, name in enumerate(names) if name in options)
             for options in (SPEED_AXES, CLEARANCE_AXES, ("friction",))
         )
@@ -96,6 +99,7 @@ class OperatingPoints:
         self.response_axes = sorted(rotor_axes + node_axes)
         self._speed_setters = [*(rotor_axes if self._is_speed_ratio else ()), self._speed_axis]
         self.costly_dims = self.dims(self._speed_axis, *self.rig_axes, *self._contact_axes)
+        self.setup_axes = [self._speed_axis, *self.rig_axes, *self._contact_axes, *self._drive_axes]
         # Cached by value, not by index: of axes that share a dimension only some may matter here.
         self._rig_at = lru_cache(maxsize=256)(self._make_rig)
         self._contact_at = lru_cache(maxsize=4096)(self._make_contact)
@@ -147,7 +151,7 @@ class OperatingPoints:
 
     def friction(self, index: Index) -> float:
         """Coefficient of friction of a case."""
-        return self._on([self._friction_axis], index)[0]
+        return self._on([self.friction_axis], index)[0]
 
     def contact(self, index: Index) -> Contact:
         """Contact of a case."""

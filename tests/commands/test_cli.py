@@ -1,14 +1,11 @@
 from __future__ import annotations
 
-import math
 import re
 import subprocess
 import sys
-from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import click
-import numpy as np
 import pytest
 from running import environment, write_study
 
@@ -212,29 +209,6 @@ def test_the_python_face(tmp_path: Path):
         rubhpc.nothing  # noqa: B018
 
 
-def test_plan_extrapolates_cases_that_take_long_from_where_they_rub(tmp_path, monkeypatch):
-    """Of a case that is shortened, the revolutions before its first contact are the cheapest."""
-    from rubhpc.running.followed_case import FollowedCase
-    from rubhpc.running.plan import make_plan
-    from rubhpc.study.study import read_study
-
-    def timed(followed, recording, most):
-        first = followed._state or 0
-        n = first + recording.longest_transient + recording.revolutions
-        return 0.1 * (max(0, n - 5) - max(0, first - 5)), SimpleNamespace(
-            final=n, signals={}, spectra={}, sections={}
-        )
-
-    monkeypatch.setattr(FollowedCase, "_timed", timed)
-    monkeypatch.setattr("rubhpc.running.pilot_cases.arrays_of", lambda _: {})
-    study = read_study(write_study(tmp_path, transient=60, revolutions=15))
-    found = make_plan(study)
-    assert found.timing.pace.friction == 0.0
-    pace = found.timing.pace
-    steps = pace.step * found.steps + pace.case * found.counts[0]
-    assert steps == pytest.approx(found.counts[0] * 0.1 * (60 + 15 - 5), rel=0.2)  # speeds differ in steps
-
-
 def test_plan_names_the_start_of_a_process(tmp_path, capsys):
     code, out, _ = call(capsys, "plan", write_study(tmp_path))
     assert code == 0
@@ -251,83 +225,17 @@ def test_plan_times_a_transient_that_ends_by_itself(tmp_path, capsys):
     assert "failed      " not in out
 
 
-def test_pilots_see_every_value_of_an_axis_within_blocks(tmp_path, monkeypatch):
-    """The first cases of blocks, which hold all of a friction axis, would never rub."""
-    from rubhpc.running import pilot_cases, plan
-    from rubhpc.study.study import read_study
+def test_plan_shows_why_its_cases_failed(tmp_path, monkeypatch, capsys):
+    from rubhpc.running import timed_cases
 
-    asked = []
-
-    def pace(self, index, steps, limit):
-        asked.append(self._grid.case(index))
-        return pilot_cases.Pace(1.0, 0.0, 0.0, 0.0)
-
-    monkeypatch.setattr(pilot_cases.Pilots, "pace", pace)
-    study = read_study(write_study(tmp_path))
-    plan.make_plan(study)
-    assert {case.friction for case in asked} == set(study.axis("friction").values)
-    assert len(asked) == len({case.id for case in asked})
-
-
-def test_pilots_stand_for_all_cases(tmp_path, monkeypatch):
-    """Their mean pace is that of the whole study where long cases take more steps, too; few cases suffice."""
-    from rubhpc.running import pilot_cases, plan
-    from rubhpc.study.cases import CaseGrid
-    from rubhpc.study.study import read_study
-
-    speeds = [0.9 + 0.1 * i for i in range(40)]
-    study = read_study(write_study(tmp_path, speed_ratio=speeds, clearance_ratio=[0.5, 0.6, 0.7, 0.8]))
-
-    def seconds(index, steps):
-        return steps * (1.0 + index[0]) * (1.0 + 2.0 * (index[1] == 3))
-
-    paces = {}
-
-    def pace(self, index, steps, limit):
-        paces[index] = seconds(index, steps) / steps
-        return pilot_cases.Pace(paces[index], 0.0, 0.0, 0.0)
-
-    monkeypatch.setattr(pilot_cases.Pilots, "pace", pace)
-    grid = CaseGrid(study)
-    cost = {
-        case.index: block.cost / math.prod(block.shape)
-        for block in grid.blocks()
-        for case in grid.cases(block)
-    }
-    each = [seconds(index, steps) for index, steps in cost.items()]
-    whole = sum(each)
-    found = plan.make_plan(study)
-    assert found.timing.n_pilot == len(paces) < len(cost) / 2
-    assert found.core_hours * 3600 == pytest.approx(whole, rel=3 * found.timing.spread)
-    unseen = 1.0 - len(paces) / len(each)
-    error = math.sqrt(unseen * len(each) ** 2 / len(paces)) * np.std(each) / whole
-    assert found.timing.spread == pytest.approx(error, rel=0.25)
-
-
-def test_only_missing_cases_are_timed(tmp_path, monkeypatch):
-    from rubhpc.running import pilots
-    from rubhpc.study.cases import CaseGrid
-    from rubhpc.study.study import read_study
-
-    grid = CaseGrid(read_study(write_study(tmp_path)))
-    missing = np.zeros(grid.shape, bool)
-    missing[-1, ..., 0] = True
-    blocks = [block for block in grid.blocks() if pilots.share_of(block, missing).any()]
-    picked = [index for index, *_ in pilots._picked(blocks, missing)]
-    assert sorted(picked) == [tuple(index) for index in np.argwhere(missing).tolist()]
-
-
-def test_plan_shows_why_its_pilots_failed(tmp_path, monkeypatch, capsys):
-    from rubhpc.running import pilot_cases
-
-    def burst(*_: object) -> None:
+    def burst(*_: object, **__: object) -> None:
         raise ZeroDivisionError("by\nzero")
 
-    monkeypatch.setattr(pilot_cases, "set_up", burst)
+    monkeypatch.setattr(timed_cases, "record_of", burst)
     code, out, err = call(capsys, "plan", write_study(tmp_path))
     assert (code, err) == (0, "")
-    assert "core-hours unknown: the pilot cases failed" in out
-    assert "failed      a pilot case: speed_ratio=0.9, clearance_ratio=0.7, friction=0.1: " in out
+    assert "core-hours unknown: the timed cases failed" in out
+    assert "failed      a timed case: speed_ratio=0.9, clearance_ratio=0.7, friction=0.1: " in out
     assert "ZeroDivisionError: by zero" in out
 
 

@@ -19,7 +19,7 @@ from rubhpc.errors import InputError
 from rubhpc.integrate.branches import case
 from rubhpc.running.plan import make_plan
 from rubhpc.running.progress import Progress
-from rubhpc.running.stopwatch import Enough, Stopwatch
+from rubhpc.running.timed_cases import CaseTimer, Enough
 from rubhpc.study.study import read_study
 
 STUDY = """
@@ -229,25 +229,26 @@ def test_case_without_a_motion_is_done_with_a_remark(tmp_path, monkeypatch):
 
 def test_plan_predicts_branches_from_how_far_the_first_has_come(tmp_path, monkeypatch):
     """Cut off where a motion is sought for the n-th time; later it has come by more of the range."""
-    predicted = []
+    (tmp_path / "study.toml").write_text(STUDY)
+    shares = []
     for most in (8, 12):
         began: list[int] = []
 
-        def cut(self, run, limit, began=began, most=most):
+        def limit(self, seconds, began=began, most=most):
+            began.clear()
+
             def check():
                 began.append(1)
                 if len(began) == most:
                     raise Enough
 
-            with pytest.raises(Enough):
-                run(check)
-            return 1.0, None
+            return check
 
-        monkeypatch.setattr(Stopwatch, "timed", cut)
-        (tmp_path / "study.toml").write_text(STUDY)
+        monkeypatch.setattr(CaseTimer, "_limit", limit)
         plan = make_plan(read_study(tmp_path / "study.toml", tmp_path / f"{most}.zarr"))
-        assert len(began) == most  # the other case would take as long
         assert "at least" not in plan.text()
         assert re.search(r"\(\d.* to \d.* on one core\)", plan.text())
-        predicted.append(3600.0 * plan.core_hours)
-    assert 2.0 < predicted[1] < predicted[0] < 60.0  # two cases, each 1 s for a share of its range
+        first = plan.sample.cases[0]
+        assert first.rest == pytest.approx(first.spent * (2.0 / first.share - 1.0))
+        shares.append(first.share)
+    assert 0.0 < shares[0] < shares[1] < 1.0

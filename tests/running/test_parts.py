@@ -17,8 +17,8 @@ from stub_physics import Physics, record
 from rubhpc.errors import InputError, StoppedEarly, StoreError
 from rubhpc.running import case_setup, job, worker
 from rubhpc.running.driver import run
-from rubhpc.running.pilots import Pace, Timing
 from rubhpc.running.plan import make_plan
+from rubhpc.running.plan_estimate import Estimate
 from rubhpc.schema import MISSING
 from rubhpc.storage.in_progress import InProgress
 from rubhpc.storage.lock import read_holder
@@ -317,8 +317,9 @@ def test_status_and_plan_show_the_parts(physics, tmp_path, monkeypatch):
     assert "no run is active" not in text
     assert sum(part.n_case for part in status.parts) == 28
     assert sum(part.n_missing for part in status.parts) == status.counts[MISSING]
-    monkeypatch.setattr("rubhpc.running.plan.time_pilots", lambda *_: Timing(pace=Pace(1e-3, 0.0, 0.0, 0.0)))
-    monkeypatch.setattr("rubhpc.running.plan.seconds_of", lambda pace, steps, *_: pace.step * steps)
+    monkeypatch.setattr(
+        "rubhpc.running.plan_estimate.Cost.estimate", lambda cost: Estimate(*[1e-3 * cost.steps] * 3)
+    )
     plans = [make_plan(study, f"{number}/4") for number in range(1, 5)]
     assert [plan.counts[MISSING] == 0 for plan in plans] == [False, True, False, False]
     assert sum(plan.core_hours for plan in plans) == pytest.approx(make_plan(study).core_hours)

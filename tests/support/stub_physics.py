@@ -64,6 +64,7 @@ class Physics:
         initial: None,
         check: Callable[[], None],
         say: Callable[[str], None],
+        note: Callable[[float], None],
     ) -> Record:
         self.on_case()
         check()

@@ -73,7 +73,7 @@ def record_branches(
     say : callable, optional
         Called with the progress, as text.
     note : callable, optional
-        Called then with the value of the parameter there.
+        Called before with the value of the parameter there.
     """
     began, span = time.perf_counter() - seconds_compiling(), axis.drawn_from
     assert span is not None

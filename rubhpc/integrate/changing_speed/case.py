@@ -67,6 +67,7 @@ def record_run_up(
     initial: State | Initial,
     check: Callable[[], None] | None = None,
     say: Callable[[str], None] = lambda _: None,
+    note: Callable[[float], None] = lambda _: None,
 ) -> RunUpRecord:
     """Integrate a case whose speed changes; arguments as of `integrate_run_up` or `integrate_driven`.
 
@@ -78,7 +79,7 @@ def record_run_up(
         )
     began = time.perf_counter() - seconds_compiling()
     case: dict[str, Any] = {"clearance": clearance, "friction": friction, "initial": initial}
-    case |= {"check": check, "say": say}
+    case |= {"check": check, "say": say, "note": note}
     found = (
         integrate_driven(setup, law, **case)
         if isinstance(law, DriveLaw)

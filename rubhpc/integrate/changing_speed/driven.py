@@ -79,6 +79,7 @@ def integrate_driven(
     pieces_per_revolution: int | None = None,
     check: Callable[[], None] | None = None,
     say: Callable[[str], None] = lambda _: None,
+    note: Callable[[float], None] = lambda _: None,
 ) -> DrivenRun:
     """Integrate a case whose speed is free and record every revolution.
 
@@ -94,6 +95,8 @@ def integrate_driven(
         Called between kernel calls; what it raises ends the case.
     say : callable
         Called with the speed reached as often as `check`, if that is given.
+    note : callable
+        Called with the share of the revolutions that is done.
 
     Raises
     ------
@@ -114,6 +117,7 @@ def integrate_driven(
     n_step, reason, n_done, end, at = 0, "", 0, ALL_TURNED, 0
     energies = np.zeros(6)
     while at < n * per_revolution:
+        note(at / (n * per_revolution))
         if pieces_per_revolution is None:
             length = _fitting(length, at, n * per_revolution, per_revolution)
         taken = spin.take(at, length, per_revolution, is_fixed=pieces_per_revolution is not None)

@@ -89,6 +89,7 @@ def integrate_run_up(
     pieces_per_revolution: int | None = None,
     check: Callable[[], None] | None = None,
     say: Callable[[str], None] = lambda _: None,
+    note: Callable[[float], None] = lambda _: None,
 ) -> RunUp:
     """Integrate a case with a changing speed and record every revolution.
 
@@ -105,6 +106,8 @@ def integrate_run_up(
         Called between kernel calls; what it raises ends the run-up.
     say : callable
         Called with the speed reached as often as `check`, if that is given.
+    note : callable
+        Called with the share of the revolutions that is done.
     """
     model, per_revolution = fastest.model, fastest.samples_per_revolution
     pieces, passing = Pieces(fastest), Passing(clearance, friction, check, say)
@@ -171,6 +174,7 @@ def integrate_run_up(
                 held_from = times[piece]
         while not reason and (place := piece - begins_at) < len(block):
             first = int(cuts[piece])
+            note(first / cuts[-1])
             stretch, before_it, follows = None, (earlier, before[piece]), goes_on or place > 0
             if not late[piece]:
                 stretch = passing.take_several(
