@@ -31,8 +31,7 @@ def verdicts(manifest: Manifest, is_done: NDArray[np.bool_], measures: NDArray[n
     known = measures.dtype.names or ()
     parts = []
     if "regime" in known:
-        regime = measures["regime"]
-        counts = np.bincount(regime[is_done & (regime >= 0)], minlength=len(REGIME))
+        counts = [int((measures["regime"][is_done] == flag).sum()) for flag in range(len(REGIME))]
         named = [f"{n} {name.replace('_', ' ')}" for name, n in zip(REGIME, counts, strict=True) if n]
         parts += [", ".join(named)] if named else []
     if "settled" in known:
