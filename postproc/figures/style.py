@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -77,7 +78,9 @@ def save(figure: Figure, path: str | Path) -> Path:
     """Write the figure as png, pdf or svg, by its extension, and return its path."""
     path = check_figure_path(path)
     try:
-        figure.savefig(path)
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "constrained_layout not applied")  # labels of very long numbers
+            figure.savefig(path)
     except OSError as error:
         raise InputError(
             f"{path}: cannot be written: {reason_of(error, path)}; choose another --figure"

@@ -23,7 +23,7 @@ _MOST_ENTRIES = 2**22  # of lists and tables in them: each takes a hundred bytes
 _TYPES = {"bool", *(f"{kind}{n}" for kind in ("int", "uint") for n in (8, 16, 32, 64))}
 _TYPES |= {f"float{n}" for n in (16, 32, 64)}
 _COMPRESSORS = "blosc", "zstd"
-_MOST_CHUNKS = 2**20  # of an array, or of a shard: zarr lists them all
+_MOST_CHUNKS, _MOST_OF_SHARD = 2**16, 2**20  # of an array: zarr has a task for each; and of a shard
 _MOST_CHUNK = 2**31  # bytes, which blosc cannot pass
 # A longer array of one dimension is a coordinate, which is read as a store is opened: it is all there, and
 # blosc shrinks nothing to less than 1/255.
@@ -119,7 +119,7 @@ def _checked(about: dict[str, Any], path: Path) -> int:
     codecs = about["codecs"]
     if codecs[0]["name"] == "sharding_indexed":
         inside = codecs[0]["configuration"]
-        _check_lengths(chunk, inside["chunk_shape"])
+        _check_lengths(chunk, inside["chunk_shape"], _MOST_OF_SHARD)
         n_inner = math.prod(n // c for n, c in zip(chunk, inside["chunk_shape"], strict=True))
         _check_codecs(inside["index_codecs"], ())
         _check_codecs(inside["codecs"], ("blosc",))
@@ -136,12 +136,12 @@ def _checked(about: dict[str, Any], path: Path) -> int:
     return most
 
 
-def _check_lengths(shape: list[int], chunk: list[int]) -> None:
+def _check_lengths(shape: list[int], chunk: list[int], most: int = _MOST_CHUNKS) -> None:
     """Refuse lengths that are no numbers, that do not fit each other, or make too many chunks."""
     lengths = [*shape, *chunk]
     if not all(type(n) is int and 0 <= n < 2**63 for n in lengths) or 0 in chunk:
         raise ValueError("lengths that are no numbers")
-    if math.prod(-(-n // c) for n, c in zip(shape, chunk, strict=True)) > _MOST_CHUNKS:
+    if math.prod(-(-n // c) for n, c in zip(shape, chunk, strict=True)) > most:
         raise ValueError("too many chunks")
 
 

@@ -44,7 +44,7 @@ class Integrator:
         doc="Time step: in contact (modal), or everywhere (central-difference).",
         example='"0.5 us"',
         default=None,
-        above=0,
+        at_least=1e-9,  # of a thousandth of it no case would see its end
     )
     accuracy: float = quantity(
         "",

@@ -133,6 +133,17 @@ def test_an_error_of_the_programs_own_is_one_line_too(capsys, monkeypatch):
     assert err.count("\n") == 1
 
 
+def test_a_store_that_cannot_be_evaluated_is_a_store_that_cannot_be_used(capsys, monkeypatch):
+    def slip(*_: object) -> None:
+        raise LookupError("stator")
+
+    monkeypatch.setattr(cli.commands, "invoke", slip)
+    code, _, err = call(capsys, "map", "x")
+    assert code == 3
+    assert err.startswith("rubhpc: rank 0: LookupError: stator; the traceback is in ")
+    assert err.endswith("; please report it, unless rubhpc verify finds damage\n")
+
+
 def test_plan_run_status_verify(capsys, tmp_path):
     study, store = write_study(tmp_path), tmp_path / "tiny.zarr"
     code, out, err = call(capsys, "plan", study)

@@ -9,10 +9,12 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 import rubhpc
+from postproc.cases.reduction import reduce_store
 from postproc.figures.bifurcation import bifurcation
 from postproc.figures.branch_lines import events_at, mark_over_map, runs
 from postproc.figures.multipliers import at_edges, multipliers
 from postproc.report.page import Page
+from postproc.store.case_table import case_table
 from postproc.store.live import open_live
 from postproc.store.open import open_store
 from rubhpc.errors import InputError
@@ -95,6 +97,16 @@ def test_what_is_lost_is_computed_anew_to_the_same_bytes(store):
     lost.unlink()
     rubhpc.run(read_study(store / "study.toml", path), quiet=True)
     assert {file: file.read_bytes() for file in kept} == kept
+
+
+def test_points_are_rows_of_a_table_and_have_quantiles(store):
+    path = store / "branches.zarr"
+    points = open_store(path)
+    table = case_table(points)
+    assert table.sizes["row"] == points.sizes["point"]
+    assert table["clearance"].values.tolist() == points["clearance"].values.tolist()
+    middle = reduce_store(path, "quantiles", "peak_contact_force", levels=[0.5])["peak_contact_force"]
+    assert middle.item() == pytest.approx(np.nanmedian(points["peak_contact_force"]))
 
 
 def test_report_has_the_branches_of_each_case(store):
