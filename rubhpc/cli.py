@@ -108,7 +108,7 @@ def main(args: list[str] | None = None) -> None:
     """Run the command line and exit with its code."""
     for name in (*VARIABLES, SAFE_PATH):
         os.environ[name] = "1"
-    logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # it tells of reads that an error has cut short
+    logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # it reports reads that an error has cut short
     given = sys.argv[1:] if args is None else args
     with lasting_streams() as problem:
         code = _code_of(given)
