@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rubhpc.storage.lock import Holder
 
 _SHOWN = 10  # failed cases named
-_MOST_BYTES = 10**8  # of measures that are read for the verdicts; of larger stores a run alone tells them
+_MOST_BYTES = 10**8  # of measures that are read for the verdicts; of larger stores only a run states them
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""What a study is told before it runs: unstable rotors, sag beyond the clearance, how modes decay."""
+"""What is stated of a study before it runs: unstable rotors, sag beyond the clearance, decay of modes."""
 
 from __future__ import annotations
 
