@@ -1,4 +1,4 @@
-"""What a study is warned of before it runs: unstable rotors, sags, how modes decay."""
+"""What is stated of a study before it runs: unstable rotors, sag beyond the clearance, decay of modes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import numpy as np
 
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.lasting import decay_message, undamped_message
-from rubhpc.fem.statics import sag_remark
 from rubhpc.units import typed_quantity
 
 if TYPE_CHECKING:
@@ -28,8 +27,7 @@ _MOST_RIGS = 8  # whose modes are looked at; of more, an even spread
 
 def warnings_of(points: OperatingPoints) -> tuple[str, ...]:
     """Return a line for each thing that is likely to be a mistake; none as a rule."""
-    remark = sag_remark(points.model((0,) * len(points.points.dims)))
-    found = (_instability(points), _sag(points), remark, _undamped(points))
+    found = (_instability(points), _sag(points), _undamped(points))
     return tuple(line for line in found if line)
 
 
