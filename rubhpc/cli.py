@@ -5,11 +5,13 @@ Nothing heavy is imported before a command needs it: `rubhpc --help` names all c
 
 from __future__ import annotations
 
+import atexit
 import difflib
 import logging
 import os
 import sys
 import time
+import warnings
 from importlib import import_module
 
 import click
@@ -108,7 +110,6 @@ def main(args: list[str] | None = None) -> None:
     """Run the command line and exit with its code."""
     for name in (*VARIABLES, SAFE_PATH):
         os.environ[name] = "1"
-    logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # it reports reads that an error has cut short
     given = sys.argv[1:] if args is None else args
     with lasting_streams() as problem:
         code = _code_of(given)
@@ -117,7 +118,15 @@ def main(args: list[str] | None = None) -> None:
                 f"standard output: {problem()}; what was printed is incomplete, write it to another place",
                 code or (2 if _prints_results(given) else 0),
             )
+        if code:  # Python would tell of each read that the error has cut short
+            logging.getLogger("asyncio").setLevel(logging.CRITICAL)
+            atexit.register(_end_quietly)
         leave(code)
+
+
+def _end_quietly() -> None:
+    warnings.simplefilter("ignore")
+    sys.unraisablehook = lambda _: None
 
 
 def _code_of(args: list[str]) -> int:

@@ -11,6 +11,7 @@ import xarray as xr
 from running import check_a_lost_chunk
 
 import rubhpc
+from postproc.cases.reduction import reduce_store
 from postproc.figures.bode import bode
 from postproc.figures.orbit import orbit
 from postproc.figures.spectrum import spectrum
@@ -60,6 +61,12 @@ def test_a_store_is_opened_before_its_measures_are_packed(folder, tmp_path):
     whole = open_live(tmp_path / "run_ups.zarr").load()
     (tmp_path / "run_ups.zarr/.rubhpc/packed.json").unlink()
     xr.testing.assert_equal(open_live(tmp_path / "run_ups.zarr").load(), whole)
+
+
+def test_measures_of_run_ups_have_quantiles(folder):
+    path = folder / "run_ups.zarr"
+    found = reduce_store(path, "quantiles", "peak_contact_force", levels=[1.0])["peak_contact_force"]
+    assert found.item() == rubhpc.open(path)["peak_contact_force"].max()
 
 
 def test_cases_are_those_of_the_function(folder):

@@ -261,7 +261,8 @@ CASES = [
         "central-difference",
     ),
     _study("step in metres", "0.4 us", "0.4 um", "[integrator] step:", "not in s"),
-    _study("no step", '"0.4 us"', "0.0", "[integrator] step: 0 s", "above 0"),
+    _study("no step", '"0.4 us"', "0.0", "[integrator] step: 0 s", "at least"),
+    _study("a step of 1e-12 s", '"0.4 us"', "1e-12", "[integrator] step: ", "at least"),
     _study(
         "record unknown",
         "revolutions",
