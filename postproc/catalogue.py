@@ -89,11 +89,13 @@ class Figure:
         InputError
             A value is none of those offered or out of range, or the cases cannot be drawn so.
         """
+        from postproc.signals.places import named_places
+
         given = inspect.Signature(self.parameters).bind(*args, **words).arguments
         for name, value in given.items():
             self.options[name].check(value)
         function = getattr(import_module(f"postproc.figures.{self.name}"), self.name)
-        drawing: Drawing = function(cases, *args, **words)
+        drawing: Drawing = function(named_places(cases), *args, **words)
         return drawing
 
 

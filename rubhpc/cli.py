@@ -15,12 +15,13 @@ import click
 
 from postproc.catalogue import figures
 from rubhpc import __version__
-from rubhpc.errors import RubError, printable
+from rubhpc.children import SAFE_PATH
+from rubhpc.errors import RubError, StoppedEarly, printable
 from rubhpc.frames import with_room
 from rubhpc.running.launch import FIRST_SPEAKS, launch, leave
+from rubhpc.streams import lasting_streams
 from rubhpc.threads import VARIABLES
 
-_STOPPED = 75
 # name -> (where it is, what it does). The figure commands come from `postproc.catalogue`.
 COMMANDS = {
     "run": ("rubhpc.commands.run:run", "Run or resume a study; the word run may be omitted."),
@@ -97,32 +98,47 @@ def commands() -> None:
 
     `mpirun -n N rubhpc STUDY.toml` runs a study on N ranks; the same command continues it after a stop.
 
-    Exit codes: 0 complete; 1 finished, some cases failed; 2 bad input; 3 store cannot be used; 70 an internal
-    error; 71 complete, but a rank was lost; 75 stopped early, run the same command again.
+    Exit codes: 0 complete; 1 finished, some cases failed; 2 bad input or output; 3 store cannot be used;
+    70 an internal error; 71 complete, but a rank was lost; 75 stopped early, run the same command again.
     """
 
 
 def main(args: list[str] | None = None) -> None:
     """Run the command line and exit with its code."""
-    for name in VARIABLES:
+    for name in (*VARIABLES, SAFE_PATH):
         os.environ[name] = "1"
+    given = sys.argv[1:] if args is None else args
+    with lasting_streams() as problem:
+        code = _code_of(given)
+        if problem():
+            code = _report(
+                f"standard output: {problem()}; what was printed is incomplete, write it to another place",
+                code or (2 if _prints_results(given) else 0),
+            )
+        leave(code)
+
+
+def _code_of(args: list[str]) -> int:
+    """Run the command line and report its error; returns the exit code."""
     try:
-        code = with_room(commands.main, args, prog_name="rubhpc", standalone_mode=False)
+        return with_room(commands.main, args, prog_name="rubhpc", standalone_mode=False) or 0
     except RubError as error:
-        code = _report(str(error), error.exit_code)
+        return _report(str(error), error.exit_code)
     except click.ClickException as error:
-        code = _report(_one_line(error), 2)
+        return _report(_one_line(error), 2)
     except (KeyboardInterrupt, click.Abort):
-        code = _report("interrupted; run the same command again", _STOPPED)
-    except BrokenPipeError:  # the reader, `head` say, has had enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        code = 0
-    except Exception as error:
+        return _report("interrupted; run the same command again", StoppedEarly.exit_code)
+    except BaseException as error:  # SystemExit of a user's code included: the command has not ended
         from rubhpc.running.crash import crash
 
         crashed = crash(error)
-        code = _report(str(crashed), crashed.exit_code)
-    leave(code)
+        return _report(str(crashed), crashed.exit_code)
+
+
+def _prints_results(args: list[str]) -> bool:
+    """Whether what a command prints is its result; a run and a search for knocks have it in files."""
+    printing = {"--help", "-h", "--version", *COMMANDS, *figures()} - {"run", "knock"}
+    return not printing.isdisjoint(args[:1])
 
 
 def _report(text: str, code: int) -> int:

@@ -1,5 +1,39 @@
 """Errors that reach the user: one line with where, what is wrong and how to fix it, and an exit code."""
 
+from __future__ import annotations
+
+import errno
+import os
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+_LOCKED = (
+    "HDF5 cannot lock it; close what has it open, or set HDF5_USE_FILE_LOCKING=FALSE where the file system "
+    "has no locks"
+)
+_NO_INODES = "no inodes are left for another file (df -i); remove some files"
+
+
+def reason_of(error: OSError, path: Path) -> str:
+    """Return why the file or directory at `path` cannot be written, with a cure where it is hard to guess."""
+    if "unable to lock file" in str(error):
+        return _LOCKED
+    return _NO_INODES if lacks_inodes(error, path) else error.strerror or str(error)
+
+
+def lacks_inodes(error: OSError, path: Path) -> bool:
+    """Whether a disk is full of files, not of bytes."""
+    if error.errno != errno.ENOSPC:
+        return False
+    try:
+        place = next(folder for folder in (path, *path.absolute().parents) if folder.exists())
+        disk = os.statvfs(place)
+    except (OSError, StopIteration):
+        return False
+    return disk.f_files > 0 and disk.f_favail == 0
+
 
 def printable(text: str) -> str:
     """Return a text as one line that is safe on a terminal: white space as blanks, other controls escaped."""

@@ -1,4 +1,4 @@
-"""Least knocks of the cases of a study: one by one, on several processes, and resumed."""
+"""Least knocks of the cases of a study: one by one, kept, and put together."""
 
 from __future__ import annotations
 
@@ -6,18 +6,13 @@ import glob
 import hashlib
 import json
 import math
-import multiprocessing
-import signal
-import threading
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.errors import InputError
+from rubhpc.errors import InputError, reason_of
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import check_response_node, first_lateral_frequency
 from rubhpc.integrate.case import compile_kernels, run_case
@@ -26,11 +21,12 @@ from rubhpc.knock_search import Direction, find_least
 from rubhpc.schema import DONE, REGIME
 from rubhpc.study.cases import CaseGrid
 from rubhpc.study.initial import CONTACT_FREE, Initial
-from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
+
+    import xarray as xr
 
     from rubhpc.study.cases import Case
     from rubhpc.study.study import Study
@@ -54,7 +50,7 @@ class LeastKnock:
 
 @dataclass(frozen=True, kw_only=True)
 class Search:
-    """How the cases of a study are searched; see `rubhpc.knocks.least_knock`."""
+    """How the cases of a study are searched; see `rubhpc.least_knock`."""
 
     study: Study
     angles: int
@@ -147,62 +143,67 @@ class Progress:
                 file.write(f"\n{json.dumps({'key': key} | asdict(found))}\n")
         except OSError as error:
             raise InputError(
-                f"{self._path}: cannot be written ({error.strerror}); choose another place"
+                f"{self._path}: cannot be written ({reason_of(error, self._path)}); choose another place"
             ) from None
 
 
-def search_cases(
-    search: Search, indices: Sequence[Index], workers: int
-) -> Iterator[tuple[Index, LeastKnock]]:
-    """Yield the result of each case, on as many processes, in the order in which they end."""
-    if workers == 1 or len(indices) < 2:
-        for index in indices:
-            yield index, search.of_case(index)
-        return
-    search.compile()
-    others = set(multiprocessing.active_children())
-    spawn = multiprocessing.get_context("spawn")
-    sent = replace(search)  # without its grid, which every process makes for itself
-    with _exit_on_sigterm(), ProcessPoolExecutor(min(workers, len(indices)), spawn, _take, (sent,)) as pool:
-        try:
-            under_way = {pool.submit(_of_case, index): index for index in indices}
-            for ended in as_completed(under_way):
-                yield under_way[ended], ended.result()
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            for process in set(multiprocessing.active_children()) - others:
-                process.terminate()
-            raise
+def search_of(
+    study: Study, *, angles: int, nodes: Sequence[int], most: float | None, tolerance: float
+) -> Search:
+    """Return the search of a study's cases; see `rubhpc.least_knock`.
+
+    Raises
+    ------
+    InputError
+        As there.
+    """
+    if starts := [axis.name for axis in study.axes if axis.is_initial_key]:
+        raise InputError(f"[grid] {starts[0]}: the knock itself is searched for; remove this axis")
+    tables = {"branch": study.branch, "run_up": study.run_up, "drive": study.drive}
+    for table, found in tables.items():
+        if found is not None:
+            raise InputError(f"[{table}]: knocks are searched for at a constant speed; remove this table")
+    if angles < 1 or not 0.0 < tolerance < 1.0 or (most is not None and not most > 0.0):
+        raise InputError(f"angles {angles}, tolerance {tolerance:g}, most {most}: give numbers above 0")
+    return Search(study=study, angles=angles, nodes=tuple(nodes), most=most, tolerance=tolerance)
 
 
-@contextmanager
-def _exit_on_sigterm() -> Iterator[None]:
-    """Have SIGTERM raise `SystemExit`, so that the worker processes end and what they share is freed."""
-    is_default = signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
-    if not is_default or threading.current_thread() is not threading.main_thread():
-        yield  # threads set no handlers, and those of others stay
-        return
+def dataset_of(search: Search, found: Mapping[str, LeastKnock]) -> xr.Dataset:
+    """Return the results of all cases, by their keys, over the axes of the study."""
+    import xarray as xr
 
-    def end(*_: object) -> None:
-        raise SystemExit(128 + signal.SIGTERM)
-
-    signal.signal(signal.SIGTERM, end)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
-
-
-_taken: list[Search] = []  # of a worker process
-
-
-def _take(search: Search) -> None:
-    _taken[:] = [search]
-
-
-@on_one_thread
-def _of_case(index: Index) -> LeastKnock:
-    return _taken[0].of_case(index)
+    study, grid = search.study, search.grid
+    keys = [search.key(index) for index in np.ndindex(grid.shape)]
+    columns = {
+        name: np.array([getattr(found[key], name) for key in keys]).reshape(grid.shape)
+        for name in LeastKnock.__annotations__
+    }
+    about = {
+        "least_impulse": ("N s", "least impulse that leads to rub"),
+        "harmless_impulse": ("N s", "largest impulse below it that did not"),
+        "worst_angle": (
+            "rad",
+            "direction of the least impulse, from straight up in the sense of positive spin",
+        ),
+        "worst_node": ("1", "node of the least impulse (0: the output node)"),
+        "knocks": ("1", "knocks computed"),
+        "has_contact_free_motion": ("1", "whether the machine can run free of contact"),
+    }
+    return xr.Dataset(
+        {
+            name: (grid.dims, values, {"units": about[name][0], "long_name": about[name][1]})
+            for name, values in columns.items()
+        },
+        coords={
+            axis.coordinate: (
+                axis.dimension,
+                np.array(axis.values),
+                {"units": axis.unit or "1", "long_name": axis.long_name},
+            )
+            for axis in study.axes
+        },
+        attrs={"title": study.title},
+    )
 
 
 class _Knocks:

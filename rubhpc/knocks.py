@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from rubhpc.errors import InputError
-from rubhpc.knock_cases import LeastKnock, Progress, Search, search_cases
-from rubhpc.threads import on_one_thread
+from rubhpc.running.knocks_on_ranks import least_knock_on, take_part
+from rubhpc.running.pool import Alone
+from rubhpc.running.workers import start_workers
+from rubhpc.streams import lasting_streams
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
     import xarray as xr
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rubhpc.study.study import Study
 
 
-@on_one_thread
+@lasting_streams()
 def least_knock(
     study: Study,
     *,
@@ -69,72 +69,14 @@ def least_knock(
         The study has axes of starts, [branch], [run_up] or [drive], a node does not move sideways, or a
         number is out of range.
     """
-    search = search_of(study, angles=angles, nodes=nodes, most=most, tolerance=tolerance)
-    if workers < 1:
-        raise InputError(f"workers {workers}: give 1 or more")
-    kept, n_case = Progress(progress), search.grid.n_case
-    left = search.left(kept.found)
-    report(n_case - len(left), n_case)
-    for done, (index, one) in enumerate(search_cases(search, left, workers), n_case - len(left) + 1):
-        kept.enter(search.key(index), one)
-        report(done, n_case)
-    return dataset_of(search, kept.found)
-
-
-def search_of(
-    study: Study, *, angles: int, nodes: Sequence[int], most: float | None, tolerance: float
-) -> Search:
-    """Return the search of a study's cases; see `least_knock`.
-
-    Raises
-    ------
-    InputError
-        As there.
-    """
-    if starts := [axis.name for axis in study.axes if axis.is_initial_key]:
-        raise InputError(f"[grid] {starts[0]}: the knock itself is searched for; remove this axis")
-    tables = {"branch": study.branch, "run_up": study.run_up, "drive": study.drive}
-    for table, found in tables.items():
-        if found is not None:
-            raise InputError(f"[{table}]: knocks are searched for at a constant speed; remove this table")
-    if angles < 1 or not 0.0 < tolerance < 1.0 or (most is not None and not most > 0.0):
-        raise InputError(f"angles {angles}, tolerance {tolerance:g}, most {most}: give numbers above 0")
-    return Search(study=study, angles=angles, nodes=tuple(nodes), most=most, tolerance=tolerance)
-
-
-def dataset_of(search: Search, found: Mapping[str, LeastKnock]) -> xr.Dataset:
-    """Return the results of all cases, by their keys, over the axes of the study; see `least_knock`."""
-    import xarray as xr
-
-    study, grid = search.study, search.grid
-    keys = [search.key(index) for index in np.ndindex(grid.shape)]
-    columns = {
-        name: np.array([getattr(found[key], name) for key in keys]).reshape(grid.shape)
-        for name in LeastKnock.__annotations__
-    }
-    about = {
-        "least_impulse": ("N s", "least impulse that leads to rub"),
-        "harmless_impulse": ("N s", "largest impulse below it that did not"),
-        "worst_angle": (
-            "rad",
-            "direction of the least impulse, from straight up in the sense of positive spin",
-        ),
-        "worst_node": ("1", "node of the least impulse (0: the output node)"),
-        "knocks": ("1", "knocks computed"),
-        "has_contact_free_motion": ("1", "whether the machine can run free of contact"),
-    }
-    return xr.Dataset(
-        {
-            name: (grid.dims, values, {"units": about[name][0], "long_name": about[name][1]})
-            for name, values in columns.items()
-        },
-        coords={
-            axis.coordinate: (
-                axis.dimension,
-                np.array(axis.values),
-                {"units": axis.unit or "1", "long_name": axis.long_name},
-            )
-            for axis in study.axes
-        },
-        attrs={"title": study.title},
-    )
+    with nullcontext(Alone()) if workers == 1 else start_workers(workers, take_part) as pool:
+        return least_knock_on(
+            pool,
+            lambda: study,
+            angles=angles,
+            nodes=nodes,
+            most=most,
+            tolerance=tolerance,
+            progress=progress,
+            report=report,
+        )

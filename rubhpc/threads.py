@@ -5,14 +5,15 @@ On matrices as small as these, threads also take more processor time than they s
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from functools import cache, wraps
-from typing import TYPE_CHECKING, ParamSpec, TypeVar
+from threading import Lock
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from rubhpc.frames import with_room
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from contextlib import AbstractContextManager
+    from collections.abc import Callable, Iterator
 
     from threadpoolctl import ThreadpoolController
 
@@ -44,10 +45,25 @@ def on_one_thread(function: Callable[P, T]) -> Callable[P, T]:
     return held
 
 
-def one_thread() -> AbstractContextManager[object]:
-    """Hold them to one thread within a context; it costs some 10 us."""
-    limit: AbstractContextManager[object] = _controller().limit(limits=1)
-    return limit
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Hold them to one thread within a context; it costs some 10 us.
+
+    Of contexts of several threads at once, the last to end gives back what the first has found.
+    """
+    with _counting:
+        _held.append(_held[0] if _held else _controller().limit(limits=1))
+    try:
+        yield
+    finally:
+        with _counting:
+            limit = _held.pop()
+            if not _held:
+                limit.restore_original_limits()
+
+
+_held: list[Any] = []  # the limit, once for each context
+_counting = Lock()
 
 
 @cache

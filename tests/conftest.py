@@ -2,12 +2,14 @@
 
 Linear algebra has one thread, as under the commands: two would wait for each other on small matrices.
 Examples of hypothesis have no deadline, since the first may compile a kernel, and are the same in every run.
-Tests in a browser are collected where there is one. Tests in parallel have a cache of kernels each.
+Tests in a browser are collected where there is one, those of ROSS where it is installed. Tests in parallel
+have a cache of kernels each.
 """
 
 import os
 import sys
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -27,6 +29,7 @@ SLOW = (
     "fem/test_campbell.py::test_critical_speed_of_another_order",
     "fem/test_campbell.py::test_critical_speeds_solve_the_synchronous_problem",
     "fem/test_critical_speeds.py",
+    "fem/test_shaft_parts.py::test_schemes_agree",
     "fem/test_linear_design.py::test_tables_set_the_range_and_the_sag",
     "fem/test_speed_dependence.py::test_a_case_is_that_of_constant_bearings[central",
     "figures/test_accessor.py::test_each_figure_is_drawn",
@@ -82,6 +85,7 @@ SLOW = (
     "integrate/test_tangent_motion.py::test_tangent_is_that_of_the_saltation_matrices[ring",
     "integrate/test_transient.py::test_laws_without_closed_form_settle_as_with_auto",
     "kernels/test_accumulators.py",
+    "kernels/test_cache.py",
     "kernels/test_complementarity.py",
     "kernels/test_contact_pairs.py",
     "kernels/test_coulomb_friction.py",
@@ -94,6 +98,7 @@ SLOW = (
     "project/test_slurm.py",
     "project/test_wheel.py",
     "report/",
+    "rig/test_ross_elements.py",
     "rig/test_ring.py::test_a_store_shows_where_the_stators_stand",
     "running/",
     "signals/test_hilbert_huang.py",
@@ -239,11 +244,15 @@ if "PYTEST_XDIST_WORKER" in os.environ:
     use_own_cache(os.environ["PYTEST_XDIST_WORKER"])
 
 collect_ignore = [] if find_browser() else ["browser"]
+if find_spec("ross") is None:
+    collect_ignore.append("rig/test_ross_elements.py")
 
 
-def pytest_report_header() -> str:
-    """State which browser there is."""
-    return f"browser: {find_browser() or 'no Chromium with playwright, tests/browser is left out'}"
+def pytest_report_header() -> list[str]:
+    """State which browser there is, and whether ROSS is."""
+    ross = "installed" if find_spec("ross") else "not installed, tests/rig/test_ross_elements.py is left out"
+    browser = find_browser() or "no Chromium with playwright, tests/browser is left out"
+    return [f"browser: {browser}", f"ROSS: {ross}"]
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:

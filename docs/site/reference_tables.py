@@ -1,6 +1,8 @@
 """Reference tables from the declarations themselves: keys of files, commands, variables, Python names.
 
-A page asks for one by a comment, `<!-- generated: study -->`.
+A page asks for one by a comment, `<!-- generated: study -->`. Tables of keys and variables are in the pages
+themselves, up to `<!-- end -->`, for readers of the repository; `python docs/site/reference_tables.py` writes
+them there, and a test holds them to the code.
 """
 
 from __future__ import annotations
@@ -11,6 +13,7 @@ import inspect
 import pkgutil
 import re
 import typing
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -34,6 +37,8 @@ from rubhpc.study.tables import Integrator, Recording, Run, Sample
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
+_ASKED = re.compile(r"^<!-- generated: (\w+) -->$(?:\n\n.*?\n<!-- end -->$)?", re.MULTILINE | re.DOTALL)
+_READABLE = ("axes", "study", "rig", "variables")  # commands have --help, the others are Sphinx's directives
 # Table of a file -> the dataclass that declares its keys, in the order of the pages.
 STUDY_TABLES = {
     "[contact]": Contact,
@@ -72,7 +77,7 @@ def _walk(owner: type, above: str, found: dict[type, list[str]]) -> None:
             path = f"{above}{field.name}"
             head = f"[[{path}]]" if typing.get_origin(hints[field.name]) is tuple else f"[{path}]"
             if kind not in found:
-                found[kind] = []
+                found[kind] = [head]
                 _walk(kind, f"{path}.", found)
             if head not in found[kind]:
                 found[kind].append(head)
@@ -85,8 +90,20 @@ def _dataclasses_in(hint: Any) -> list[type]:
 
 
 def expand(text: str) -> str:
-    """Return a page with the tables that it asks for."""
-    return re.sub(r"^<!-- generated: (\w+) -->$", lambda found: _TABLES[found[1]](), text, flags=re.MULTILINE)
+    """Return a page with the tables that it asks for, for the site."""
+    return _ASKED.sub(lambda found: _TABLES[found[1]](), text)
+
+
+def refreshed(text: str) -> str:
+    """Return a page of the repository with its tables as the code declares them."""
+    return _ASKED.sub(
+        lambda found: (
+            f"<!-- generated: {found[1]} -->\n\n{_TABLES[found[1]]().rstrip()}\n\n<!-- end -->"
+            if found[1] in _READABLE
+            else found[0]
+        ),
+        text,
+    )
 
 
 def key_tables(tables: dict[str, type]) -> str:
@@ -318,3 +335,7 @@ _TABLES = {
     "postproc": postproc_names,
 }
 assert postproc  # its rooms are imported by name
+
+if __name__ == "__main__":
+    for page in (Path(__file__).parents[1] / "reference").glob("*.md"):
+        page.write_text(refreshed(page.read_text()))

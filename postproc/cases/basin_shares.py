@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
+from numpy.lib.stride_tricks import sliding_window_view
+from scipy.special import entr
 
 from postproc.cases.attractors import NO_MOTION
 from rubhpc.schema import REGIME
@@ -78,22 +80,24 @@ def wilson(count: xr.DataArray, n: xr.DataArray) -> tuple[xr.DataArray, xr.DataA
 def basin_entropy(attractor: xr.DataArray, x: str, y: str) -> tuple[float, float]:
     """Return basin entropy and boundary basin entropy of starts on a grid, nat.
 
-    The mean Gibbs entropy of the motions in boxes of `ENTROPY_BOX` by `ENTROPY_BOX` starts, over all boxes,
-    and over those of more than one motion: above ln 2 the boundary is fractal (Daza and others, Sci. Rep. 6,
-    31416, 2016). NaN where the grid is smaller than a box, or no box has more than one motion.
+    The mean Gibbs entropy of the motions in boxes of `ENTROPY_BOX` by `ENTROPY_BOX` neighbouring starts, over
+    boxes at all places of the grid, and over those of more than one motion. Above ln 2 the boundary is
+    fractal (Daza and others, Sci. Rep. 6, 31416, 2016). Starts without a motion are left out of their boxes.
+    NaN where the grid is smaller than a box or no start has a motion, and on the boundaries where no box has
+    two motions.
     """
-    grid = attractor.transpose(y, x).values
-    boxes = []
-    for i in range(0, grid.shape[0] - ENTROPY_BOX + 1, ENTROPY_BOX):
-        for j in range(0, grid.shape[1] - ENTROPY_BOX + 1, ENTROPY_BOX):
-            box = grid[i : i + ENTROPY_BOX, j : j + ENTROPY_BOX]
-            _, n = np.unique(box[box != NO_MOTION], return_counts=True)
-            share = n / max(n.sum(), 1)
-            boxes.append(float(-(share * np.log(share)).sum()) if n.size else np.nan)
-    found = np.array(boxes)
-    found = found[np.isfinite(found)]
-    mixed = found[found > 0.0]
-    return (float(found.mean()) if found.size else np.nan, float(mixed.mean()) if mixed.size else np.nan)
+    grid = attractor.transpose(y, x).sortby([y, x]).values
+    if min(grid.shape) < ENTROPY_BOX:
+        return np.nan, np.nan
+    # The places overlap: boxes side by side would miss a boundary that runs between them.
+    boxes = sliding_window_view(grid, (ENTROPY_BOX, ENTROPY_BOX)).reshape(-1, ENTROPY_BOX**2)
+    count = np.array([(boxes == n).sum(axis=1) for n in np.unique(grid[grid != NO_MOTION])])
+    if not count.size:
+        return np.nan, np.nan
+    count = count[:, count.any(axis=0)]
+    entropy = np.asarray(entr(count / count.sum(axis=0)).sum(axis=0))
+    is_mixed = (count > 0).sum(axis=0) > 1
+    return float(entropy.mean()), float(entropy[is_mixed].mean()) if is_mixed.any() else np.nan
 
 
 def name_of(regime: int, period: int) -> str:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
+from postproc.store.attributes import table_of
 from postproc.store.axes import axes_of, drawn_axes, find_axis, source
 from postproc.store.run_ups import STEADY, is_run_up
 from postproc.store.select import narrow
@@ -140,8 +141,7 @@ def map_data(store: xr.Dataset, value: str, spread: Sequence[str], facets: Seque
 
 def monitors(store: xr.Dataset) -> dict[str, tuple[int, str, Callable[[xr.DataArray], xr.DataArray]]]:
     """Return the monitors that hold for a store: under Coulomb's law slip may reverse."""
-    study = store.attrs.get("study")
-    contact = study.get("contact", {}) if isinstance(study, dict) else {}
+    contact = table_of(store, "study").get("contact", {})
     has_stick = contact.get("friction_law") == "coulomb"
     return {n: monitor for n, monitor in VALIDITY.items() if not (has_stick and n == "minimum_slip_speed")}
 

@@ -26,8 +26,9 @@ from postproc.store.select import select
 from postproc.store.variables import LONG_ROLES, require_measure
 from postproc.store.worst import worst_of_stators
 from rubhpc.errors import InputError
+from rubhpc.input.array_files import CHECKED
 from rubhpc.schema import DONE, HAS_VALUES, role_of
-from rubhpc.storage.regular_files import CHECKED, RegularFiles
+from rubhpc.storage.regular_files import RegularFiles
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -54,7 +55,11 @@ def open_in_pieces(path: str | Path, n_byte: float | None = None) -> xr.Dataset:
     with warnings.catch_warnings(), zarr.config.set(FAST_DECODING if is_fast else CHECKED):
         warnings.simplefilter("ignore", RuntimeWarning)  # as in `open_store`
         bare = xr.open_zarr(
-            path if is_fast else files, chunks=None, decode_times=False, decode_timedelta=False
+            path if is_fast else files,
+            chunks=None,
+            zarr_format=3,
+            decode_times=False,
+            decode_timedelta=False,
         )
     pieces: dict[str, xr.DataArray] = {}
     for name in map(str, store.data_vars):

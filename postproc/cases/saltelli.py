@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from postproc.store.attributes import table_of
 from postproc.store.axes import drawn_axes, source
 from postproc.store.units import displayed
 from rubhpc.errors import InputError
@@ -71,8 +72,7 @@ def drawn_ranges(store: xr.Dataset) -> list[str]:
 
 
 def _study(store: xr.Dataset) -> dict[str, Any]:
-    study = store.attrs.get("study")
-    return study if isinstance(study, dict) else {}
+    return table_of(store, "study")
 
 
 def estimate(values: Floats, n_draw: int, confidence: float, seed: int) -> tuple[Floats, Floats]:

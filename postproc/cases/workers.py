@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import zarr
 
+from rubhpc.children import SAFE_PATH
 from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
@@ -68,6 +69,7 @@ def workers(
             queue=queue,
             walltime=walltime,
             job_name="rubhpc-reduce",
+            job_script_prologue=[f"export {SAFE_PATH}=1"],
         )
         cluster.scale(n=n_worker)
     with cluster as address, distributed.Client(address) as client:

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-_ROOM = 1.15  # of the largest displacement: within that stators are drawn
+_ROOM = 1.15  # of the largest displacement, around it
+_FAR = 3.0  # times that: stators beyond are not drawn
 
 
 def draw_motions(data: xr.Dataset, case: xr.Dataset, colors: Mapping[int, str], ax: Axes) -> Axes:
@@ -33,8 +34,10 @@ def draw_motions(data: xr.Dataset, case: xr.Dataset, colors: Mapping[int, str], 
     vertical, horizontal = data[f"{kind}_vertical"], data[f"{kind}_horizontal"]
     size = float(np.nanmax(np.abs([vertical.values, horizontal.values])))
     scale = scale_for("m", size)
-    if "clearance" in case.variables and case["clearance"].size == 1:
-        draw_stators(case.squeeze(), ax, scale.factor, _ROOM * size * scale.factor)
+    reach = _ROOM * size * scale.factor
+    is_known = "clearance" in case.variables and case["clearance"].size == 1
+    if is_known and 0.0 < float(case["clearance"].item()) * scale.factor < _FAR * reach:
+        draw_stators(case.squeeze(), ax, scale.factor, reach)
     for number, color in colors.items():
         if number not in data["attractor"].values:  # inferred alone
             continue

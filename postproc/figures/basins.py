@@ -90,16 +90,20 @@ def basins(
     if is_plane:
         entropy, boundary = basin_entropy(found, across, up)
         shown["basin_entropy"], shown["boundary_basin_entropy"] = entropy, boundary
-        is_mixed = np.isfinite(boundary)
-        near = f"{boundary:.3g} (fractal above 0.693)" if is_mixed else "none: there is one motion"
+        near = f"{boundary:.3g} (fractal above 0.693)"
+        if not np.isfinite(boundary):
+            near = (
+                f"none: {'no box has two motions' if shown['attractor'].size > 1 else 'there is one motion'}"
+            )
         if np.isfinite(entropy):  # NaN of a grid that is smaller than a box
             notes.append(f"basin entropy {entropy:.3g}, on the boundaries {near}")
-    if shown["fraction"].dims != ("attractor",) or not shown["attractor"].size:
+    is_one_setting = shown["fraction"].dims == ("attractor",)
+    if not (is_one_setting and shown["attractor"].size):
         return Drawing(
             shown=shown,
             draw=lambda axes: draw_basins(shown, across, up, axes[0]),
             height=80.0,
-            lines=(*notes,),
+            lines=(*notes, *(described(shown) if is_one_setting else ())),
         )
     shown = shown.assign(examples(found, cases, over).data_vars)
 

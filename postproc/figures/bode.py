@@ -47,7 +47,8 @@ def bode(
     """Bode plot: amplitude and phase lag of an order over the speed.
 
     Of a run-up by revolution, or of the cases of a study along its speeds, whose waveforms it needs. Critical
-    speeds are marked; of peaks of 1X, the speed and the amplification factor (API 684).
+    speeds are marked; of peaks of 1X, the speed and the amplification factor (API 684), or "rub" where the
+    rotor rubs within the half-power speeds: such a response is not linear and has no factor.
 
     Parameters
     ----------
@@ -106,7 +107,7 @@ def draw_bode(
     if n_case > 1 and len(signals) > len(_DASHES):
         raise InputError(f"{len(signals)} signals of several cases cannot be distinguished; select one case")
     is_swept, has_fallen = along == "revolution", False
-    peaks: list[tuple[ResponsePeak, Line2D]] = []
+    peaks: list[tuple[ResponsePeak, Line2D, bool]] = []
     for i_signal, name in enumerate(signals):
         amplitude, phase = data[f"amplitude_{name}"], data[f"phase_{name}"]
         curves = zip(overlaid(amplitude, along), overlaid(phase, along), strict=True)
@@ -128,9 +129,15 @@ def draw_bode(
                 top.plot(rpm, np.where(back, size, np.nan), **faint)
                 bottom.plot(rpm, np.where(back, lag, np.nan), **faint)
                 has_fallen = True
+            touch = np.zeros(rpm.size)
+            if "contact_fraction" in data:
+                contact = data["contact_fraction"]
+                touch = np.nan_to_num(contact.isel({over: i_case} if over in contact.dims else {}).values)
             for way in (~back, back) if order == 1.0 else ():
-                found = peaks_of(own_speeds.values[way], size[way], lag[way], is_swept)
-                peaks += [(peak, curve) for peak in found]
+                at = own_speeds.values[way]
+                for peak in peaks_of(at, size[way], lag[way], is_swept):
+                    low, high = peak.half_power_speeds
+                    peaks.append((peak, curve, bool((touch[way][(at >= low) & (at <= high)] > 0.0).any())))
     shown = [signal_name(data[f"amplitude_{signals[0]}"])] if len(signals) == 1 else []
     top.set_title(", ".join([*shown, written_order(order)]), fontsize=8)
     top.set(ylabel=scale.label("Amplitude, 0\N{EN DASH}peak"), xlim=ends)
@@ -187,20 +194,20 @@ def peaks_of(speed: Floats, height: Floats, lag: Floats, is_swept: bool = False)
     return found
 
 
-def _name_peaks(ax: Axes, peaks: Sequence[tuple[ResponsePeak, Line2D]]) -> None:
-    """Write speed (rpm) and amplification factor at peaks, from the highest, where there is room.
+def _name_peaks(ax: Axes, peaks: Sequence[tuple[ResponsePeak, Line2D, bool]]) -> None:
+    """Write speed (rpm) and amplification factor, or "rub", at peaks, from the highest, where there is room.
 
     The words are above all curves, in the colour of their own; those of near peaks are above one another.
     """
     taken: list[tuple[float, float, int]] = []  # speed, height and row of each
     room, curves = ROOM * np.ptp(ax.get_xlim()), [np.asarray(line.get_data()) for line in ax.lines]
-    for peak, line in sorted(peaks, key=lambda named: -named[0].amplitude):
+    for peak, line, rubs in sorted(peaks, key=lambda named: -named[0].amplitude):
         rpm = RPM * peak.speed
         near = [(height, row) for other, height, row in taken if abs(rpm - other) < room]
         row = 1 + max((row for _, row in near), default=-1)
         if row == ROWS or any(peak.amplitude < LESSER * height for height, _ in near):
             continue
-        words = f"{rpm:.0f} rpm, AF {peak.amplification_factor:.3g}"
+        words = f"{rpm:.0f} rpm, " + ("rub" if rubs else f"AF {peak.amplification_factor:.3g}")
         if any(words == text.get_text() for text in ax.texts):  # on the way down as on the way up
             continue
         top = max(float(np.nanmax(y[abs(x - rpm) < 0.6 * room], initial=peak.amplitude)) for x, y in curves)

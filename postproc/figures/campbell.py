@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from postproc.figures.label_places import LEADER, Labels
+
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
@@ -90,7 +92,7 @@ def _stretches(words: list[str]) -> Iterator[tuple[str, slice]]:
 
 
 def _number(ax: Axes, speeds: NDArray[np.float64]) -> None:
-    """Write each critical speed, rpm, below its marker; those whose numbers would meet share a line."""
+    """Write each critical speed, rpm, by its marker; those whose numbers would meet share a line."""
     left, right = ax.get_xlim()
     box = ax.get_window_extent()
     per_rpm, per_hertz = (  # points
@@ -108,23 +110,25 @@ def _number(ax: Axes, speeds: NDArray[np.float64]) -> None:
             last.append(rpm)
         else:
             lines.append([rpm])
+    curves = (np.asarray(curve.get_xydata(), dtype=float).T for curve in ax.lines)
+    labels = Labels(ax, [(x, y) for x, y in curves if np.isfinite(x + y).any()])
     for line in lines:
-        is_right = (right - line[-1]) * per_rpm < _DIGIT * len(_line(line)) + _GAP
-        at = line[0] if is_right else line[-1]
+        at = np.array([line[-1], line[-1] / 60])
+        offset, is_far = labels.place(_line(line), at, np.array([1.0, -1.0]))
         ax.annotate(
             _line(line),
-            (at, at / 60),
-            xytext=(-_GAP if is_right else _GAP, _GAP if is_right else -2),
+            tuple(at),
+            xytext=tuple(offset),
             textcoords="offset points",
-            ha="right" if is_right else "left",
-            va="bottom" if is_right else "top",
+            ha="center",
+            va="center",
             fontsize=_SIZE,
-            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.3},
+            arrowprops=LEADER if is_far else None,
         )
 
 
 def _line(speeds: list[float]) -> str:
-    return ", ".join(f"{rpm:.0f}" for rpm in speeds)
+    return ", ".join(dict.fromkeys(f"{rpm:.0f}" for rpm in speeds))
 
 
 def _draw_order(ax: Axes, order: int) -> None:

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 
-from postproc.figures.cascade_lines import draw_frequencies, draw_orders, ordinate
+from postproc.figures.cascade_lines import draw_frequencies, draw_orders, name_senses, ordinate
 from postproc.figures.cells import cell_edges, is_geometric
 from postproc.figures.drawing import Drawing
-from postproc.figures.options import hertz
+from postproc.figures.options import end_of_abscissa, hertz
 from postproc.figures.ticks import tick_levels
 from postproc.signals.cascade import below, default_axis, hold_peaks, hold_rows
 from postproc.signals.cascade import cascade as cascade_data
 from postproc.signals.lines import SPIKE, parse_orders, spikes
-from postproc.signals.spectra import signal_or_whirl
+from postproc.signals.places import signal_or_whirl
 from postproc.store.axes import find_axis
 from postproc.store.rig_of_case import natural_frequencies
 from postproc.store.select import first_of_rest
@@ -28,24 +28,27 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-    from postproc.figures.options import Axis, Hertz, Metavar, Positive
+    from postproc.figures.options import Axis, Count, Hertz, Metavar
 
 _ROWS = 60  # of a waterfall: more overlap at column width
 _PIXELS = (800, 500)  # of an intensity picture at column width and 300 dpi
 _DECADES = 3.0
+_MOST_ORDER = 5.0  # of the abscissa over orders, by default
 _NAMES_HIGH = 0.07  # of the rows' span, above the highest line, for the names of orders
 _NAMES = {"frequency": "Frequency (Hz)", "order": "Order (multiples of spin speed)"}
 
 
 def cascade(
     cases: xr.Dataset,
-    signal: str = "torsion",
+    signal: str | None = None,
     *,
     full: bool = False,
+    probes: tuple[str, str] | None = None,
+    node: Count | None = None,
+    stator: Count | None = None,
     along: Axis | None = None,
     form: Literal["waterfall", "intensity"] = "waterfall",
-    max_frequency: Hertz | None = None,
-    max_order: Positive = 5.0,
+    max: Hertz | None = None,  # noqa: A002 - the word of the command
     orders: bool = False,
     order_lines: Annotated[str, Metavar("LIST")] = "1/3,1/2,2/3,1,3/2,2,3",
     mark: Mapping[str, Hertz] | None = None,
@@ -59,17 +62,21 @@ def cascade(
     cases
         Other axes are taken at their first value.
     signal
-        Which recorded signal.
+        Which recorded signal [default: torsion].
     full
         Forward and backward whirl of the orbit instead of a signal.
+    probes
+        Names of two probes at one place, whose orbit is taken in place of the disc's.
+    node
+        Node of the rotor whose orbit is taken: the recorded one, or one with two probes.
+    stator
+        Number of a stator, at whose node the orbit is taken.
     along
         The axis of the cascade [default: the speed].
     form
         Stacked spectra, or amplitudes as colours.
-    max_frequency
-        End of the abscissa [default: beyond modes and 1X].
-    max_order
-        End of the abscissa over orders.
+    max
+        End of the abscissa, Hz, or a number of orders with `orders` [default: beyond modes and 1X; order 5].
     orders
         Draw over orders instead of Hz.
     order_lines
@@ -79,17 +86,17 @@ def cascade(
     """
     lines = parse_orders(order_lines, "--order-lines")
     along = find_axis(cases, along) if along else default_axis(cases)
+    given = end_of_abscissa(max, orders)
     cases, notes = first_of_rest(cases, [along, "stator"], "status")
-    spectra = cascade_data(cases, signal_or_whirl(signal, full), along)
+    cases, name = signal_or_whirl(cases, signal, "torsion", full, probes, node, stator)
+    spectra = cascade_data(cases, name, along)
     frequencies: dict[str, Any] = dict(natural_frequencies(cases, str(spectra.dims[0])))
     if full:  # lateral motion alone
         frequencies.pop("torsional", None)
-    for name, value in (mark or {}).items():
-        frequencies[name] = hertz(value, f"--mark {name}")
+    for marked, value in (mark or {}).items():
+        frequencies[marked] = hertz(value, f"--mark {marked}")
     abscissa = "order" if orders else "frequency"
-    limit = max_order if orders else default_limit(spectra, frequencies)
-    if max_frequency is not None and not orders:
-        limit = hertz(max_frequency, "--max-frequency")
+    limit = given or (_MOST_ORDER if orders else default_limit(spectra, frequencies))
 
     def draw(axes: list[Axes]) -> None:
         is_waterfall = form == "waterfall"
@@ -145,7 +152,7 @@ def waterfall(
     if not has_result.all():
         style: dict[str, Any] = {"color": "0.4", "fontsize": 6.0, "ha": "right", "va": "bottom", "zorder": 7}
         ax.text(0.95 * limit, rows[~has_result].max(), "no result", **style)  # of all dotted ones
-    _name_senses(ax)
+    name_senses(ax)
     return ax
 
 
@@ -178,7 +185,7 @@ def intensity(spectra: xr.DataArray, ax: Axes, limit: float, abscissa: str = "fr
     ax.set(xlim=(_start(spectra, limit), limit), xlabel=_NAMES[abscissa], ylabel=label)
     _name_decades(ax, held)
     tick_levels(ax, "y", held[held.dims[0]], rows)
-    _name_senses(ax, "0.9")
+    name_senses(ax, "0.9")
     bar = ax.figure.colorbar(mesh, ax=ax, pad=0.02, aspect=30, extend="min")
     bar.set_label(scale.label(f"{short_name(held)} amplitude"))
     return ax
@@ -195,14 +202,6 @@ def default_limit(spectra: xr.DataArray, frequencies: Mapping[str, xr.DataArray 
 def _start(spectra: xr.DataArray, limit: float) -> float:
     """Return where the abscissa begins: at 0, or as far backward as forward for full spectra."""
     return -limit if float(spectra["order"].min()) < 0 else 0.0
-
-
-def _name_senses(ax: Axes, color: str = "k") -> None:
-    """Say which side of full spectra whirls backward, at the lower ends of the axes."""
-    if ax.get_xlim()[0] < 0:
-        style: dict[str, Any] = {"va": "bottom", "transform": ax.transAxes, "color": color, "zorder": 7}
-        ax.text(0.02, 0.02, "backward", ha="left", **style)
-        ax.text(0.98, 0.02, "forward", ha="right", **style)
 
 
 def _name_decades(ax: Axes, spectra: xr.DataArray) -> None:

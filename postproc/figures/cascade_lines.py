@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from postproc.figures.cells import is_geometric
-from postproc.store.units import displayed
+from postproc.store.units import displayed, plain_number
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 ORDERS = tuple(Fraction(*f) for f in ((1, 3), (1, 2), (2, 3), (1, 1), (3, 2), (2, 1), (3, 1)))
 _CHARACTER = 0.018  # of the axes, for a letter of a name
-_CORNER = 0.16  # of the ordinate, above which the bar that shows the size of spectra may be
+_CORNER = 0.24  # of the ordinate, above which the bar that shows the size of spectra may be
 
 
 def draw_orders(
@@ -90,7 +90,7 @@ def draw_frequencies(
         text: dict[str, Any] = {"textcoords": "offset points", "fontsize": 6.5, "color": color, "zorder": 6}
         if abscissa == "frequency":
             at = float(np.clip(x[-1], left + 0.1 * (right - left), right - 0.14 * (right - left)))
-            label = f"{name} {values[-1]:.4g} Hz"
+            label = f"{name} {plain_number(values[-1])} Hz"
             half = 0.5 * _CHARACTER * len(label) * (right - left)
             level = sum(at - half < end and at + half > start for start, end in named)  # the next line up
             named.append((at - half, at + half))
@@ -98,10 +98,20 @@ def draw_frequencies(
             ax.annotate(label, (at, 1.0), xycoords=("data", "axes fraction"), **text)
         else:  # over orders the curves meet at the top and part towards slow rotation
             side, shift = ("right", -2) if x[0] > left + 0.6 * (right - left) else ("left", 2)
-            text |= {"xytext": (shift, 1), "ha": side, "va": "bottom"}
+            above = 10 if left < 0 else 1  # the senses of full spectra
+            text |= {"xytext": (shift, above), "ha": side, "va": "bottom"}
             text["bbox"] = {"facecolor": "white", "edgecolor": "none", "pad": 0.3, "alpha": 0.8}
-            ax.annotate(f"{name} {values[0]:.4g} Hz", (float(x[0]), ends[0]), **text)
+            ax.annotate(f"{name} {plain_number(values[0])} Hz", (float(x[0]), ends[0]), **text)
     return ax
+
+
+def name_senses(ax: Axes, color: str = "k", is_above: bool = False) -> None:
+    """Say which side of full spectra whirls backward, at the lower or upper ends of the axes."""
+    if ax.get_xlim()[0] < 0:
+        y, place = (0.98, "top") if is_above else (0.02, "bottom")
+        style: dict[str, Any] = {"va": place, "transform": ax.transAxes, "color": color, "zorder": 7}
+        ax.text(0.02, y, "backward", ha="left", **style)
+        ax.text(0.98, y, "forward", ha="right", **style)
 
 
 def ordinate(spectra: xr.DataArray) -> tuple[NDArray[np.float64], str]:

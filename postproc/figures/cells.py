@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+_MOST_TICKS = 40  # along a side of a map
+
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
@@ -82,21 +84,40 @@ def outline_cells(
     label: str,
     color: str = "0.25",
 ) -> list[Artist]:
-    """Draw a line around the cells of a mask (n_y, n_x); return it for a legend, or [] where none is."""
+    """Draw a line around the cells of a mask (n_y, n_x), with ticks that point into them.
+
+    Return what names it in a legend, or [] where none is.
+    """
     from matplotlib.collections import LineCollection
+    from matplotlib.lines import Line2D
+    from matplotlib.markers import TICKDOWN, TICKLEFT, TICKRIGHT, TICKUP
 
     if not mask.any():
         return []
     x, y = edges
-    row, column = np.nonzero(np.diff(np.pad(mask.astype(np.int8), ((0, 0), (1, 1))), axis=1))
+    into_right = np.diff(np.pad(mask.astype(np.int8), ((0, 0), (1, 1))), axis=1)  # 1 where the cell right is
+    row, column = np.nonzero(into_right)
     upright = np.stack([np.stack([x[column], y[row]], 1), np.stack([x[column], y[row + 1]], 1)], 1)
-    row, column = np.nonzero(np.diff(np.pad(mask.astype(np.int8), ((1, 1), (0, 0))), axis=0))
+    into_upper = np.diff(np.pad(mask.astype(np.int8), ((1, 1), (0, 0))), axis=0)
+    row, column = np.nonzero(into_upper)
     level = np.stack([np.stack([x[column], y[row]], 1), np.stack([x[column + 1], y[row]], 1)], 1)
     lines = LineCollection(
-        np.concatenate([upright, level]).tolist(), colors=color, linewidths=1.4, label=label, clip_on=False
+        np.concatenate([upright, level]).tolist(), colors=color, linewidths=1.4, clip_on=False
     )
     lines.set_capstyle("round")
-    return [ax.add_collection(lines, autolim=False)]
+    ax.add_collection(lines, autolim=False)
+    style: dict[str, Any] = {"color": color, "markersize": 3.0, "markeredgewidth": 0.6}
+    named: dict[str, Any] = style | {"marker": TICKDOWN, "linewidth": 1.4}
+    for parts, into, n, forth, back in (
+        (upright, into_right, y.size - 1, TICKRIGHT, TICKLEFT),
+        (level, into_upper, x.size - 1, TICKUP, TICKDOWN),
+    ):
+        step = -(-n // _MOST_TICKS)  # along a side of fine cells every so many have one
+        signs, places = into[into != 0], np.add(*np.nonzero(into))
+        for sign, marker in ((1, forth), (-1, back)):
+            middle = parts[(signs == sign) & (places % step == 0)].mean(axis=1)
+            ax.plot(*middle.T, linestyle="", marker=marker, scalex=False, scaley=False, **style)
+    return [Line2D([], [], label=label, **named)]
 
 
 def is_geometric(values: NDArray[np.float64]) -> bool:

@@ -8,21 +8,28 @@ import numpy as np
 
 from postproc.figures.drawing import Drawing
 from postproc.figures.run_up_marks import APART, draw_rotation, name_speeds
+from postproc.signals.places import moved_at
 from postproc.signals.run_up_spectra import mean_positions
-from postproc.signals.waveforms import seen_by_two
-from postproc.store.rig_of_case import rig_of
+from postproc.store.rig_of_case import stators_around
 from rubhpc.units import scale_for
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
+    from postproc.figures.options import Count
 
 FAR = 5.0  # times the farthest position: a clearance beyond is not drawn
-RING = 3  # stators around the disc at least
+RING = 3  # stators around the place at least
 
 
-def centreline(cases: xr.Dataset, *, probes: tuple[str, str] | None = None) -> Drawing:
+def centreline(
+    cases: xr.Dataset,
+    *,
+    probes: tuple[str, str] | None = None,
+    node: Count | None = None,
+    stator: Count | None = None,
+) -> Drawing:
     """Shaft centreline of a run-up: the mean position over the speed.
 
     Of a disc in a ring it is drawn in the ring's clearance.
@@ -33,11 +40,15 @@ def centreline(cases: xr.Dataset, *, probes: tuple[str, str] | None = None) -> D
         One case of a study with [run_up].
     probes
         Names of two probes at one place, whose position is drawn in place of the disc's.
+    node
+        Node of the rotor whose position is drawn: the recorded one, or one with two probes.
+    stator
+        Number of a stator, at whose node the position is drawn.
     """
-    seen = cases if probes is None else seen_by_two(cases, probes, others=["speed"])
-    shown = mean_positions(seen, ["vertical", "horizontal"])
-    where = "the disc" if probes is None else str(seen["vertical"].attrs["of_probes"])
-    clearance = _clearance(cases) if probes is None else None
+    cases = moved_at(cases, probes, node, stator)
+    shown = mean_positions(cases, ["vertical", "horizontal"])
+    where = str(cases["vertical"].attrs.get("place", "the disc")).removeprefix("motion at ")
+    clearance = _clearance(cases)
     return Drawing(
         shown=shown, draw=lambda axes: draw_centreline(shown, axes[0], where, clearance), height=85
     )
@@ -80,10 +91,6 @@ def draw_centreline(
 
 
 def _clearance(cases: xr.Dataset) -> float | None:
-    """Radial clearance of a ring around the disc, m; None where no ring stands there, or it is unknown."""
-    if "rig" not in cases.attrs or "clearance" not in cases.coords or cases["clearance"].size != 1:
-        return None
-    rig = rig_of(cases)
-    around = [stator.node for stator in rig.stator]
-    is_ring = len(around) >= RING and set(around) == {rig.rotor.recorded_node(around)}
-    return float(cases["clearance"].item()) if is_ring else None
+    """Radial clearance of a ring around the place, m; None where no ring stands there, or it is unknown."""
+    is_known = "clearance" in cases.coords and cases["clearance"].size == 1
+    return float(cases["clearance"].item()) if is_known and len(stators_around(cases)) >= RING else None

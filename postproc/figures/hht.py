@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 
 from postproc.figures.drawing import Drawing
-from postproc.figures.options import hertz
+from postproc.figures.options import end_of_abscissa
 from postproc.signals.hilbert_huang import (
     contact_bandwidth,
     energy_picture,
@@ -18,7 +18,7 @@ from postproc.signals.hilbert_huang import (
     span_frequencies,
 )
 from postproc.store.rig_of_case import natural_frequencies, stator_frequencies
-from postproc.store.units import scale_of, short_name
+from postproc.store.units import plain_number, scale_of, short_name
 from postproc.store.worst import at_most_loaded_stator
 from rubhpc.errors import InputError
 from rubhpc.units import scale_for
@@ -45,7 +45,7 @@ def hht(
     contact: Literal["masked", "kept"] | None = None,
     revolutions: Count = 4,
     mode: Annotated[int, Bounds(least=1, most=8)] = 1,
-    max_frequency: Hertz | None = None,
+    max: Hertz | None = None,  # noqa: A002 - the word of the command
 ) -> Drawing:
     """Hilbert-Huang analysis of a signal.
 
@@ -65,10 +65,10 @@ def hht(
         The last ones.
     mode
         Intrinsic mode, the fastest first.
-    max_frequency
-        End of the ordinate [default: twice the natural frequency].
+    max
+        End of the ordinate, Hz [default: twice the natural frequency].
     """
-    limit = None if max_frequency is None else hertz(max_frequency, "--max-frequency")
+    limit = end_of_abscissa(max, orders=False)
     if signal in cases and "stator" in cases[signal].dims:  # its contacts and natural frequency too
         cases = at_most_loaded_stator(cases)
     shown = hilbert_huang(cases, signal, contact=contact, revolutions=revolutions, n_mode=mode)
@@ -174,7 +174,7 @@ def _draw_energy(
     ax.set(xlabel=time.label("Time"), ylabel=fill("Instantaneous frequency (Hz)", _LABEL_WIDTH))
     for name, frequency in natural.items():
         if 0 < frequency < limit:
-            label = f"{name} {frequency:.4g} Hz"
+            label = f"{name} {plain_number(frequency)} Hz"
             ax.axhline(frequency, color="C1", linewidth=0.7, linestyle="--", zorder=1, label=label)
     if ax.get_legend_handles_labels()[0]:
         ax.legend(loc="upper right", handlelength=2.2)

@@ -22,6 +22,7 @@ _CIRCLE = 0.1  # of the square of an orbit's size: difference of those of its ax
 _RPM = 30 / math.pi
 _BAND: dict[str, Any] = {"color": "0.9", "zorder": 0, "linewidth": 0}
 _MAJOR: dict[str, Any] = {"color": "0.7", "linewidth": 2.0}  # seen below those of a circle
+_BEARING: dict[str, Any] = {"marker": "^", "markersize": 5, "color": "k", "markerfacecolor": "white"}
 _PROBES: tuple[dict[str, Any], ...] = (
     {"color": "C0", "linestyle": "-"},
     {"color": "C1", "linestyle": (0, (4, 1.5))},
@@ -56,8 +57,9 @@ def unbalance_response(design: xr.Dataset, node: int) -> Drawing:
         amplitude, phase = axes
         rpm = _RPM * shown["response_speed"].values
         if "operating" in design.attrs:
-            for ax in axes:
-                ax.axvspan(*(_RPM * np.array(design.attrs["operating"])), **_BAND)
+            ends = _RPM * np.array(design.attrs["operating"])
+            amplitude.axvspan(*ends, **_BAND, label="operating speeds")
+            phase.axvspan(*ends, **_BAND)
         amplitude.plot(rpm, 1e6 * shown["major_axis"].values, label="major semi-axis", **_MAJOR)
         lags: list[np.ndarray[Any, Any]] = []
         for i, angle in enumerate(shown["probe"].values):
@@ -84,7 +86,8 @@ def unbalance_response(design: xr.Dataset, node: int) -> Drawing:
 def mode_shapes(design: xr.Dataset) -> Drawing:
     """Return the mode shapes at the critical speeds, the lowest six, along the shaft.
 
-    Each is drawn at the instant of its greatest displacement, which is 1, with the size of its orbits around.
+    Each is drawn at the instant of its greatest displacement, which is 1, with the size of its orbits around;
+    triangles are bearings and seals.
 
     Parameters
     ----------
@@ -100,10 +103,14 @@ def mode_shapes(design: xr.Dataset) -> Drawing:
 
     def draw(axes: list[Axes]) -> list[Axes]:
         place, label = _along(design)
+        bearings = place[np.isin(design["node"].values, design.attrs["bearing_nodes"])]
         for i, ax in enumerate(axes):
             _draw_shape(ax, place, shown.isel(critical=i))
+            ax.plot(
+                bearings, np.zeros(bearings.size), linestyle="", label="bearing", clip_on=False, **_BEARING
+            )
             ax.set(ylim=(-1.15, 1.15), ylabel="Shape")
-        axes[-1].legend(loc="upper center", bbox_to_anchor=(0.5, -0.28), ncols=3, fontsize=6, frameon=False)
+        axes[-1].legend(loc="upper center", bbox_to_anchor=(0.5, -0.28), ncols=4, fontsize=6, frameon=False)
         axes[-1].set(xlabel=label, xlim=(place.min(), place.max()))
         return axes
 

@@ -214,7 +214,8 @@ def _dots(
 def _hatch(ax: Axes, edges: Edges, data: xr.Dataset, value: str, beyond: str, is_most: bool) -> list[Artist]:
     """Hatch what has no result, no value, or is out of the model's range, and return what names them.
 
-    `beyond` names what is out of range; where that is most of the figure, it is surrounded by a line.
+    `beyond` names what is out of range; where that is most of the figure, it is surrounded by a line with
+    ticks on its side.
     """
     status = data["status"].values
     has_values = np.isin(status, HAS_VALUES)
@@ -230,7 +231,7 @@ def _hatch(ax: Axes, edges: Edges, data: xr.Dataset, value: str, beyond: str, is
         handles += hatch_cells(ax, edges, moving, NOT_SETTLED, "||||", color=color)
     invalid = has_values & (data["validity"].values > 0)
     if is_most:
-        return handles + outline_cells(ax, edges, invalid, beyond, color=color)
+        return handles + outline_cells(ax, edges, invalid, f"{beyond}; ticks point into it", color=color)
     return handles + hatch_cells(ax, edges, invalid, beyond, "\\\\\\\\", color=color)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from postproc.cases.basin_shares import name_of
 from postproc.figures.palette import MOTION_COLORS, REGIME_COLORS
+from postproc.store.units import plain_number
 from rubhpc.schema import REGIME
 from rubhpc.units import scale_for
 
@@ -58,7 +59,7 @@ def described(data: xr.Dataset) -> list[str]:
         for name in (str(n) for n in data.data_vars if str(n).startswith("mean_")):
             value, about = float(motion[name]), data[name].attrs
             scale = scale_for(str(about.get("units", "1")), abs(value))
-            means.append(f"{about.get('long_name', name)} {value * scale.factor:.4g} {scale.unit}")
+            means.append(f"{about.get('long_name', name)} {plain_number(value * scale.factor)} {scale.unit}")
         count = f"{int(motion['count'])} of {int(motion['n_start'])} starts"
         lines.append("; ".join([f"motion {motion_label(data, number)}", count, *means]))
     if left := int(data["n_without_motion"]):

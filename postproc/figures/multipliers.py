@@ -11,7 +11,7 @@ from postproc.figures.drawing import Drawing
 from postproc.figures.palette import categories
 from postproc.store.axes import source
 from postproc.store.branch_points import is_of_points, one_case
-from postproc.store.units import displayed
+from postproc.store.units import displayed, plain_number
 from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
@@ -77,8 +77,8 @@ def draw_plane(data: xr.Dataset, ax: Axes) -> Axes:
         for marker, places in edges.items():
             ax.plot(places.real, places.imag, marker=marker, markersize=4.5, clip_on=False, zorder=5, **style)
     if largest > limit:
-        text = f"arrows: beyond, up to a modulus of {largest:.3g}"
-        ax.text(0.02, 0.98, text, transform=ax.transAxes, va="top", fontsize=6.5)
+        text = f"arrows: beyond, up to a modulus of {plain_number(largest, 3)}"
+        ax.set_title(text, fontsize=6.5, loc="left", pad=3)
     ax.set(xlim=(-limit, limit), ylim=(-limit, limit), aspect="equal")
     ax.set(xlabel="Real part of the multiplier", ylabel="Imaginary part")
     return ax
@@ -120,6 +120,6 @@ def draw_moduli(data: xr.Dataset, along: str, ax: Axes) -> Axes:
     top = float(np.nanmax(size))
     highest = 1.06 * max(1.0, min(2.0 * _LARGEST, top))
     if top > highest:
-        ax.text(0.02, 0.98, f"up to {top:.3g}", transform=ax.transAxes, va="top", fontsize=6.5)
+        ax.set_title(f"beyond the panel, up to {plain_number(top, 3)}", fontsize=6.5, loc="left", pad=3)
     ax.set(xlabel=x_label, ylabel="Largest modulus", ylim=(0.0, highest))
     return ax

@@ -29,6 +29,7 @@ __all__ = [
     "Sequence",
     "Share",
     "Speed",
+    "end_of_abscissa",
     "hertz",
     "spin_speed",
 ]
@@ -81,6 +82,17 @@ def hertz(value: float | str, option: str) -> float:
     return _above_zero(value, "Hz", option)
 
 
+def end_of_abscissa(value: float | str | None, orders: bool, option: str = "--max") -> float | None:
+    """Return the end of an abscissa, Hz or `orders` of the spin speed; None of none.
+
+    Raises
+    ------
+    InputError
+        It is not a frequency, or no number of orders, or not above 0; `option` names it.
+    """
+    return None if value is None else _above_zero(value, "" if orders else "Hz", option)
+
+
 def spin_speed(value: float | str, option: str) -> float:
     """Return a spin speed above 0, rad/s, likewise."""
     return _above_zero(value, "rad/s", option)
@@ -93,5 +105,5 @@ def _above_zero(value: float | str, unit: str, option: str) -> float:
         value = float(value)
     size = parse_quantity(value, unit, option)
     if size <= 0:
-        raise InputError(f"{option}: {size:g} {unit} is out of range; give one above 0")
+        raise InputError(f"{option}: {f'{size:g} {unit}'.strip()} is out of range; give one above 0")
     return size

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
 from postproc.figures.drawing import Drawing
 from postproc.figures.options import spin_speed
 from postproc.figures.overlay import overlaid
-from postproc.figures.run_up_marks import title_speeds
+from postproc.figures.run_up_marks import draw_rotation, title_of_speeds
 from postproc.figures.small_multiples import legend_below
+from postproc.signals.places import moved_at
 from postproc.signals.spectra import samples_per_revolution
 from postproc.signals.waveforms import orbit_data
-from postproc.store.rig_of_case import rig_of, stator_places
+from postproc.store.rig_of_case import stator_places, stators_around
 from postproc.store.units import short_name
 from postproc.store.variables import require_results
 from rubhpc.units import scale_for
@@ -25,6 +26,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from postproc.figures.options import Axis, Count, Speed
+    from rubhpc.units import Scale
+
+_MARGIN = 1.15  # of the size of an orbit or a clearance, around it
+_NEAR = 5.0  # times the size of the orbit, within which the clearance is drawn
+_WHOLE = 3.5  # the same, up to which all of the clearance is, or the centre without loads
+_ASIDE = 0.25  # of the size of the orbit, by which its middle is off the centre where that is marked
 
 
 def orbit(
@@ -34,11 +41,13 @@ def orbit(
     at: Speed | None = None,
     over: Axis | None = None,
     probes: tuple[str, str] | None = None,
+    node: Count | None = None,
+    stator: Count | None = None,
+    frame: Literal["orbit", "clearance", "mean"] = "orbit",
 ) -> Drawing:
-    """Orbit of the disc, or of the place that two probes look at.
+    """Orbit of the disc, or of another place whose motion is recorded.
 
-    With the orbit of the disc, the clearance, the stators and one point per revolution are drawn; with
-    probes, their directions.
+    The clearance, the stators, the directions of the probes and one point per revolution are drawn with it.
 
     Parameters
     ----------
@@ -52,62 +61,139 @@ def orbit(
         Draw the cases along AXIS over one another.
     probes
         Names of two probes at one place, whose motion is drawn in place of the disc's.
+    node
+        Node of the rotor whose motion is drawn: the recorded one, or one with two probes.
+    stator
+        Number of a stator, at whose node the motion is drawn.
+    frame
+        Follow the orbit, with the clearance and the centre without loads where they are near; show all of the
+        clearance; or take the mean position off.
     """
     speed = None if at is None else spin_speed(at, "--at")
-    shown = orbit_data(cases, revolutions, over, probes, speed)
+    shown = orbit_data(moved_at(cases, probes, node, stator), revolutions, over, speed)
 
     def draw(axes: list[Axes]) -> None:
-        draw_orbit(shown, axes[0])
+        draw_orbit(shown, axes[0], frame)
         legend_below(axes[0], axes[0].get_legend_handles_labels()[0])
 
     return Drawing(shown=shown, draw=draw, height=80)
 
 
-def draw_orbit(data: xr.Dataset, ax: Axes) -> Axes:
+def draw_orbit(data: xr.Dataset, ax: Axes, frame: str = "orbit") -> Axes:
     """Draw an orbit, or those along one axis over one another; positive spin turns clockwise.
 
-    One case also shows the clearance circle, its stators, the first sample (ring), one point a
-    revolution (dots) and the sense of whirl (arrow); their labels make a legend.
+    One case also shows the clearance circle, its stators, the first sample (ring), one point a revolution
+    (dots) and the sense of whirl (arrow); their labels make a legend.
+
+    Parameters
+    ----------
+    frame : {"orbit", "clearance", "mean"}
+        What is in view: the orbit and what is near it, all of the clearance, or the orbit about its mean.
     """
     vertical, horizontal = data["vertical"].load(), data["horizontal"].load()
     require_results(vertical, data)
+    title = title_of_speeds(data)
+    is_one, is_mean = vertical.ndim == 1, frame == "mean"
+    mean = np.array([float(horizontal.mean()), float(vertical.mean())]) if is_one else np.zeros(2)
+    if is_mean:
+        vertical, horizontal = (
+            (motion - motion.mean("sample")).assign_attrs(motion.attrs) for motion in (vertical, horizontal)
+        )
     size = float(np.nanmax(np.abs([vertical.values, horizontal.values])))
     scale = scale_for(str(vertical.attrs.get("units", "m")), size)
-    if "probes" in data.attrs:
-        _draw_probes(data.attrs["probes"], ax, 1.25 * size * scale.factor)
-    if vertical.ndim == 1:
-        if "probes" not in data.attrs:
-            draw_stators(data, ax, scale.factor, 1.15 * size * scale.factor)
+    if is_one:
         _draw_one(vertical, horizontal, ax, scale.factor)
+        view = _view(horizontal.values * scale.factor, vertical.values * scale.factor)
+        centre = -mean * scale.factor if is_mean else np.zeros(2)
+        is_seen = _draw_around(data, ax, scale.factor, view, centre, frame == "clearance")
+        if is_mean or not is_seen:
+            title.append(f"mean {_written(mean[1], scale)} vertical, {_written(mean[0], scale)} horizontal")
     else:
         curves = zip(overlaid(vertical, "sample"), overlaid(horizontal, "sample"), strict=True)
         for (name, y), (_, z) in curves:
             ax.plot(z.values * scale.factor, y.values * scale.factor, linewidth=0.5, label=name)
-    title_speeds(data, ax)
+    if title:
+        ax.set_title("; ".join(title), fontsize=7)
     ax.set_aspect("equal", adjustable="datalim")
     ax.locator_params(nbins=6)
-    ax.set(xlabel=scale.label(_name(horizontal)), ylabel=scale.label(_name(vertical)))
+    ax.ticklabel_format(style="plain", useOffset=False)
+    from_mean = " \N{MINUS SIGN} mean" if is_mean else ""
+    ax.set(
+        xlabel=scale.label(_name(horizontal, data) + from_mean),
+        ylabel=scale.label(_name(vertical, data) + from_mean),
+    )
+    draw_rotation(ax)
     return ax
 
 
-def _name(motion: xr.DataArray) -> str:
+def _name(motion: xr.DataArray, data: xr.Dataset) -> str:
     """Name of a motion of the disc, or of the place that probes look at."""
-    return short_name(motion.rename(None) if "of_probes" in motion.attrs else motion)
+    return short_name(motion.rename(None) if "probes" in data.attrs else motion)
 
 
-def _draw_probes(probes: list[tuple[str, float]], ax: Axes, reach: float) -> None:
-    """Draw a triangle with its name where each probe looks at the shaft; `reach` is beyond the orbit."""
-    for name, angle in probes:
-        at = (reach * math.sin(angle), reach * math.cos(angle))
-        marker = (3, 0, math.degrees(-angle) + 180.0)  # its tip points at the shaft
-        ax.plot(*at, marker=marker, color="0.35", markersize=6, linestyle="none", zorder=4)
-        ax.plot([0.0, at[0]], [0.0, at[1]], color="0.85", linewidth=0.6, zorder=0)
-        side = "left" if at[0] < 0.0 else "right"  # towards the middle
-        text = name.replace("_", " ")
-        above: dict[str, Any] = {"textcoords": "offset points", "xytext": (0, 7), "ha": side, "va": "bottom"}
-        box = {"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.8}  # over an orbit
-        ax.annotate(text, at, fontsize=7, color="0.35", zorder=6, bbox=box, **above)
-        ax.update_datalim([(at[0], at[1] + 0.25 * reach)])
+def _written(position: float, scale: Scale) -> str:
+    return f"{round(position * scale.factor, 1) + 0.0:g} {scale.unit}"  # no -0
+
+
+class _View(NamedTuple):
+    """The middle of an orbit, across and up, and half of its size, as they are displayed."""
+
+    middle: NDArray[np.float64]
+    half: float
+
+
+def _view(across: NDArray[np.float64], up: NDArray[np.float64]) -> _View:
+    ends = np.array([[f(across), f(up)] for f in (np.nanmin, np.nanmax)])
+    half = 0.5 * float(np.ptp(ends, axis=0).max())
+    return _View(ends.mean(axis=0), half or 0.05 * float(np.abs(ends).max()) or 1.0)
+
+
+def _draw_around(
+    data: xr.Dataset, ax: Axes, factor: float, view: _View, centre: NDArray[np.float64], is_whole: bool
+) -> bool:
+    """Draw what is around an orbit, and bring into view what is near it; return whether the centre is.
+
+    `centre` is that of the shaft without loads. All of the clearance is in view where `is_whole`, or where it
+    is not much larger than the orbit and near it.
+    """
+    reach = _MARGIN * view.half
+    is_of_gap = bool(stators_around(data)) and data["vertical"].attrs.get("units", "m") == "m"
+    gap = float(data["clearance"].values) * factor if is_of_gap else 0.0
+    ring = centre + (_shifts(data).mean(axis=0) * factor if "carrier_vertical" in data else 0.0)
+    toward = view.middle - ring
+    away = float(np.hypot(*toward))
+    apart = abs(gap - away)  # of the circle from the middle of the orbit
+    is_whole = is_whole or (gap < _WHOLE * reach and apart < _NEAR * reach)
+    is_near = is_whole or (apart < _NEAR * reach and away > view.half)
+    corners = [view.middle - reach, view.middle + reach]
+    if is_near and gap > 0.0:
+        draw_stators(data, ax, factor, max(reach, 0.8 * gap if is_whole else 0.4 * apart), centre)
+        beyond = ring + (gap + 0.1 * apart) * toward / (away or 1.0)
+        corners += [ring - _MARGIN * gap, ring + _MARGIN * gap] if is_whole else [beyond]
+    off = view.middle - centre
+    is_seen = is_whole or float(np.hypot(*off)) < _WHOLE * reach
+    if is_seen and float(np.hypot(*off)) > _ASIDE * view.half:
+        corners.append(centre - 0.1 * off)
+        ax.plot(*centre, "+", color="0.4", markersize=6, markeredgewidth=0.8, label="centre without loads")
+    for name, angle in data.attrs.get("probes", []):
+        corners.append(_draw_probe(name, angle, ax, view))
+    ax.dataLim.set_points(np.array([np.min(corners, axis=0), np.max(corners, axis=0)]))
+    ax.margins(0.0)
+    return is_seen
+
+
+def _draw_probe(name: str, angle: float, ax: Axes, view: _View) -> NDArray[np.float64]:
+    """Draw a triangle with its name where a probe looks at the orbit; return how far these reach."""
+    toward = np.array([math.sin(angle), math.cos(angle)])
+    at = view.middle + 1.35 * view.half * toward
+    marker = (3, 0, math.degrees(-angle) + 180.0)  # its tip points at the shaft
+    ax.plot(*at, marker=marker, color="0.35", markersize=6, linestyle="none", zorder=4)
+    ax.plot(*zip(view.middle, at, strict=True), color="0.85", linewidth=0.6, zorder=0)
+    side = "left" if toward[0] < 0.0 else "right"  # towards the middle
+    above: dict[str, Any] = {"textcoords": "offset points", "xytext": (0, 7), "ha": side, "va": "bottom"}
+    box = {"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.8}  # over an orbit
+    ax.annotate(name, tuple(at), fontsize=7, color="0.35", zorder=6, bbox=box, **above)
+    return at + np.array([0.1 * toward[0], 0.35]) * view.half
 
 
 def _draw_one(vertical: xr.DataArray, horizontal: xr.DataArray, ax: Axes, factor: float) -> None:
@@ -125,21 +211,23 @@ def _draw_one(vertical: xr.DataArray, horizontal: xr.DataArray, ax: Axes, factor
     ax.annotate("", (z[start + 2], y[start + 2]), xytext=(z[start], y[start]), arrowprops=arrow, zorder=4)
 
 
-def draw_stators(data: xr.Dataset, ax: Axes, factor: float, reach: float) -> None:
-    """Add the clearance circle and a stub of each stator; `reach` bounds what is worth showing.
+def draw_stators(
+    data: xr.Dataset, ax: Axes, factor: float, reach: float, centre: NDArray[np.float64] | None = None
+) -> None:
+    """Add the clearance circle about the `centre` and a stub of each stator; `reach` is that of the orbit.
 
     Stators on a carrier, which may move by more than the clearance, are drawn at its mean displacement.
     """
     from matplotlib.patches import Circle, Polygon
 
     clearance = float(data["clearance"].values) * factor
-    if not 0 < clearance < 3 * reach:
-        return
     edge = {"edgecolor": "0.6", "linestyle": ":", "linewidth": 0.7}
     places, is_moved = stator_places(data), "carrier_vertical" in data
-    shifts = _shifts(data) * factor if is_moved else np.zeros((len(places), 2))
-    centre = shifts[0] if len(shifts) and (shifts == shifts[0]).all() else np.zeros(2)
-    ax.add_patch(Circle((centre[0], centre[1]), clearance, fill=False, zorder=1, **edge))
+    shifts = np.zeros((len(places), 2)) if centre is None else np.tile(centre, (len(places), 1))
+    if is_moved:
+        shifts = shifts + _shifts(data) * factor
+    middle = shifts[0] if (shifts == shifts[:1]).all() else shifts.mean(axis=0)
+    ax.add_patch(Circle((middle[0], middle[1]), clearance, fill=False, zorder=1, **edge))
     ax.plot([], [], color="0.6", linestyle=":", label="clearance")
     half_angle = math.pi / max(len(places), 3)  # the stators of a ring do not overlap
     for i, (angle, offset) in enumerate(places):
@@ -156,7 +244,6 @@ def draw_stators(data: xr.Dataset, ax: Axes, factor: float, reach: float) -> Non
 
 
 def _shifts(data: xr.Dataset) -> NDArray[np.float64]:
-    """Mean displacement (n, 2), m, of what each stator at the disc stands on: horizontal, vertical."""
-    stators = rig_of(data).stator
-    at_disc = [i for i, stator in enumerate(stators) if stator.node == stators[0].node]
-    return np.stack([data[f"carrier_{name}"].values[at_disc] for name in ("horizontal", "vertical")], axis=1)
+    """Mean displacement (n, 2), m, of what each stator around stands on: horizontal, vertical."""
+    around = stators_around(data)
+    return np.stack([data[f"carrier_{name}"].values[around] for name in ("horizontal", "vertical")], axis=1)

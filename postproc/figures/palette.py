@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from postproc.store.units import scale_of, short_name
+from postproc.store.units import plain_number, scale_of, short_name
 from rubhpc.errors import InputError
 from rubhpc.schema import (
     DIVERGED,
@@ -83,7 +83,7 @@ class Paint(NamedTuple):
         """What is said instead of a scale, where a number is the same in all cases."""
         if self.names is not None or self.norm is None or self.norm.vmin != self.norm.vmax:
             return None
-        return f"{self.label}:\n{float(self.norm.vmin or 0.0):.4g} in all cases"
+        return f"{self.label}:\n{plain_number(self.norm.vmin or 0.0)} in all cases"
 
     def note(self, cells: np.ma.MaskedArray[Any, Any]) -> str | None:
         """Return what is written over a panel: the number that all its cases share, if that is zero."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 import math
 from functools import lru_cache
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from postproc.figures.label_places import LEADER, Labels
 from postproc.store.rig_of_case import rig_axes, rig_of
 from rubhpc.rig.reading import rig_from_dict
 
@@ -72,11 +72,12 @@ def written_speeds(speeds: Iterable[float]) -> str:
     return f"critical speed{'s' if len(numbers) > 1 else ''}, {', '.join(numbers)} rpm"
 
 
-def title_speeds(data: xr.Dataset, ax: Axes) -> None:
-    """Name the speeds of a waveform or an orbit of a run-up above it."""
-    if "spin_speeds" in data.attrs:
-        first, last = (f"{RPM * speed:.0f}" for speed in data.attrs["spin_speeds"])
-        ax.set_title(f"{first} rpm" if first == last else f"{first} to {last} rpm", fontsize=7)
+def title_of_speeds(data: xr.Dataset) -> list[str]:
+    """Words for the speeds of a waveform or an orbit of a run-up, for a title; [] of one speed."""
+    if "spin_speeds" not in data.attrs:
+        return []
+    first, last = (f"{RPM * speed:.0f}" for speed in data.attrs["spin_speeds"])
+    return [f"{first} rpm" if first == last else f"{first} to {last} rpm"]
 
 
 def name_speeds(
@@ -93,7 +94,7 @@ def name_speeds(
     size = math.hypot(np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim()))
     taken: list[tuple[float, float]] = []
     middle = 0.5 * sum(ax.get_xlim()), 0.5 * sum(ax.get_ylim())
-    written = _Written(ax, curves)
+    written = Labels(ax, curves)
     for text, px, py in _round_speeds(x, y, RPM * speed):
         if any(math.hypot(px - a, py - b) < apart * size for a, b in taken):
             continue
@@ -109,7 +110,7 @@ def name_speeds(
             ha="center",
             va="center",
             fontsize=6,
-            arrowprops=_LEADER if is_far else None,
+            arrowprops=LEADER if is_far else None,
         )
 
 
@@ -128,71 +129,6 @@ def _round_speeds(x: Floats, y: Floats, rpm: Floats) -> Iterator[tuple[str, floa
                 at = (1.0 - share) * x[i] + share * x[i + 1], (1.0 - share) * y[i] + share * y[i + 1]
                 if np.isfinite(at).all():
                     yield f"{value:.10g}", float(at[0]), float(at[1])
-
-
-_GAP = 2.5  # points, of a label from its mark in each direction
-_LETTER, _HEIGHT = 3.9, 6.0  # points, of a letter and its margin at the size of labels
-_MARK = 3.0  # points, half the size of a mark
-_FARTHER = (0.0, 10.0, 22.0)  # points
-_LEADER = {"arrowstyle": "-", "linewidth": 0.4, "color": "0.4", "shrinkA": 1.0, "shrinkB": 1.5}
-_AROUND = [(across, up) for across in (-1, 0, 1) for up in (-1, 0, 1) if across or up]
-
-
-class _Written:
-    """Curves and labels of a plot, in points from its lower left corner."""
-
-    def __init__(self, ax: Axes, curves: Sequence[tuple[Floats, Floats]]) -> None:
-        self._low = np.array([ax.get_xlim()[0], ax.get_ylim()[0]])
-        spans = np.array([np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim())])
-        box = np.array(ax.bbox.size) * 72.0 / ax.figure.dpi
-        self._scale = float(np.min(box / spans))  # axes of equal scale
-        self._size = spans * self._scale
-        self._points = np.concatenate([self._at(_filled(np.column_stack(curve))) for curve in curves])
-        self._boxes: list[tuple[Floats, Floats]] = []  # middles, and halves of their sizes
-        for text in ax.texts:
-            if text.get_transform() == ax.transData:
-                self._boxes.append((self._at(np.array(text.get_position())), _half(text.get_text())))
-        for points in (np.asarray(line.get_xydata()) for line in ax.lines):
-            if len(points) == 1:  # a mark
-                self._boxes.append((self._at(points[0]), np.full(2, _MARK)))
-
-    def place(self, text: str, at: Floats, away: Floats) -> tuple[Floats, bool]:
-        """Where the middle of a label goes from its point, points, if possible the way `away`.
-
-        And whether that is so far that it needs a leader.
-        """
-        half = _half(text)
-        found, least = half, math.inf
-        for farther, direction in itertools.product(_FARTHER, _AROUND):
-            offset = np.array(direction) * (_GAP + half + farther)
-            middle = self._at(at) + offset
-            covered = np.all(np.abs(self._points - middle) < half, axis=1).sum()
-            covered += 200 * sum(
-                bool(np.all(np.abs(at_box - middle) < size + half)) for at_box, size in self._boxes
-            )
-            covered += 200 * bool(np.any(middle < half) or np.any(middle > self._size - half))
-            cost = float(covered) + farther - float(away @ direction) / math.hypot(*direction)
-            if cost < least:
-                found, least, is_far, box = offset, cost, farther > 0.0, middle
-        self._boxes.append((box, half))
-        return found, is_far
-
-    def _at(self, points: Floats) -> Floats:
-        """Data, (..., 2), in points."""
-        placed: Floats = (points - self._low) * self._scale
-        return placed
-
-
-def _half(text: str) -> Floats:
-    """Half the size of a label, points."""
-    return 0.5 * np.array([_LETTER * len(text), _HEIGHT])
-
-
-def _filled(points: Floats) -> Floats:
-    """A curve (n, 2) with points between its own, those left out that are not finite."""
-    points = points[np.all(np.isfinite(points), axis=1)]
-    at = np.linspace(0.0, len(points) - 1, 2000)
-    return np.column_stack([np.interp(at, np.arange(len(points)), column) for column in points.T])
 
 
 def draw_rotation(ax: Axes) -> None:

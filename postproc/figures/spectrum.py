@@ -7,11 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
+from postproc.figures.cascade_lines import name_senses
 from postproc.figures.drawing import Drawing
+from postproc.figures.options import end_of_abscissa, spin_speed
 from postproc.figures.overlay import overlaid
 from postproc.figures.small_multiples import write_over
 from postproc.signals.lines import SPIKE, spikes, strongest_lines
-from postproc.signals.spectra import signal_or_whirl, spectrum_data
+from postproc.signals.places import signal_or_whirl
+from postproc.signals.run_up_spectra import run_up_spectra
+from postproc.signals.spectra import spectrum_data
+from postproc.store.rig_of_case import frequencies_at_speed
 from postproc.store.units import scale_of, short_name
 from postproc.store.variables import require_results
 
@@ -21,40 +26,55 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-    from postproc.figures.options import Axis, Bounds, Positive
+    from postproc.figures.options import Axis, Bounds, Count, Hertz, Speed
 
 _LABEL_WIDTH = 38  # characters that fit next to a panel
+_WINDOW = 32  # revolutions in a spectrum of a run-up
 _FLOOR = 1e-5  # of the highest line, on a log scale
 _NAMES = {"frequency": "Frequency (Hz)", "order": "Order (multiples of spin speed)"}
 
 
 def spectrum(
     cases: xr.Dataset,
-    signal: str = "torsion",
+    signal: str | None = None,
     *,
     full: bool = False,
+    probes: tuple[str, str] | None = None,
+    node: Count | None = None,
+    stator: Count | None = None,
+    at: Speed | None = None,
     orders: bool = False,
-    max: Positive | None = None,  # noqa: A002 - the word of the command
+    max: Hertz | None = None,  # noqa: A002 - the word of the command
     lines: Annotated[int, Bounds(least=0)] = 6,
     log: bool = False,
     over: Axis | None = None,
 ) -> Drawing:
     """Amplitude spectrum of a signal.
 
-    Its strongest lines are named as fractions of the spin speed, and printed.
+    Its strongest lines are named, and printed: as fractions of the spin speed where the period of the motion
+    proves them, else by decimals and the natural frequency that is near.
 
     Parameters
     ----------
     cases
         One case, or cases along the axis `over`.
     signal
-        Which recorded signal.
+        Which recorded signal [default: torsion].
     full
         Forward and backward whirl of the orbit instead of a signal.
+    probes
+        Names of two probes at one place, whose orbit is taken in place of the disc's.
+    node
+        Node of the rotor whose orbit is taken: the recorded one, or one with two probes.
+    stator
+        Number of a stator, at whose node the orbit is taken.
+    at
+        Spin speed of a run-up, such as "2000 rpm", around which a spectrum is taken over 32 revolutions,
+        through Hann's window.
     orders
         Draw over orders instead of Hz.
     max
-        End of the abscissa.
+        End of the abscissa, Hz, or a number of orders with `orders`.
     lines
         How many lines are named.
     log
@@ -62,10 +82,19 @@ def spectrum(
     over
         Draw the cases along AXIS over one another.
     """
-    shown = spectrum_data(cases, signal_or_whirl(signal, full), over).compute()
+    limit = end_of_abscissa(max, orders)
+    cases, name = signal_or_whirl(cases, signal, "torsion", full, probes, node, stator)
+    if at is None:
+        shown = spectrum_data(cases, name, over).compute()
+        speed = float(cases["spin_speed"]) if over is None else None
+    else:
+        speed = spin_speed(at, "--at")
+        one = run_up_spectra(cases, name, _WINDOW, 1, speed).isel(place=0)
+        shown = one["amplitude"].rename(name).drop_vars("revolution")
     abscissa = "order" if orders else "frequency"
-    limit = max or default_limit(shown, abscissa)
-    found = strongest_lines(shown, lines) if over is None and lines else None
+    limit = limit or default_limit(shown, abscissa)
+    natural = frequencies_at_speed(cases, speed) if "rig" in cases.attrs and speed is not None else None
+    found = strongest_lines(shown, lines, natural=natural) if over is None and lines else None
     return Drawing(
         shown=shown.to_dataset(name=str(shown.name)),
         draw=lambda axes: draw_spectrum(shown, axes[0], found, abscissa, limit, log),
@@ -122,9 +151,7 @@ def draw_spectrum(
         ax.legend(loc="upper right")
     ax.set_xlabel(_NAMES[abscissa])
     ax.set_ylabel(fill(scale.label(f"{short_name(amplitude)} amplitude"), _LABEL_WIDTH))
-    if is_full:
-        for side, x in (("backward", 0.02), ("forward", 0.98)):
-            ax.text(x, 0.96, side, ha="left" if x < 0.5 else "right", va="top", transform=ax.transAxes)
+    name_senses(ax, is_above=True)
     return ax
 
 
@@ -154,11 +181,14 @@ def _name_lines(ax: Axes, lines: xr.Dataset, factor: float, abscissa: str) -> No
         taken.append((across, up))
         side = ("right" if x < 0 else "left") if is_full else "center"
         text = str(lines["name"].values[i])
+        if near := str(lines["near"].values[i]) if "near" in lines else "":
+            text = f"{text}\n{near}"
         style: dict[str, Any] = {"ha": side, "va": "bottom", "fontsize": 6.5}
         ax.annotate(text, (x, y), xytext=(0, 1.5), textcoords="offset points", annotation_clip=True, **style)
 
 
 def _table(lines: xr.Dataset, unit: str) -> Iterator[str]:
-    columns = (lines[n].values for n in ("name", "frequency", "amplitude"))
-    for name, frequency, amplitude in zip(*columns, strict=True):
-        yield f"{name:>8} {frequency:10.3f} Hz  {amplitude:.4e} {unit}"
+    columns = (lines[n].values for n in ("name", "frequency", "amplitude", "near"))
+    for name, frequency, amplitude, near in zip(*columns, strict=True):
+        remark = f"  near the {near}" if near else ""
+        yield f"{name:>8} {frequency:10.3f} Hz  {amplitude:.4e} {unit}{remark}"

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rubhpc.errors import InputError
+from rubhpc.errors import InputError, reason_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -80,6 +80,6 @@ def save(figure: Figure, path: str | Path) -> Path:
         figure.savefig(path)
     except OSError as error:
         raise InputError(
-            f"{path}: cannot be written: {error.strerror or error}; choose another --figure"
+            f"{path}: cannot be written: {reason_of(error, path)}; choose another --figure"
         ) from error
     return path

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from postproc.store.units import displayed, meanings
+from postproc.store.units import displayed, meanings, plain_number
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,7 +38,7 @@ def tick_levels(ax: Axes, which: str, levels: xr.DataArray, at: NDArray[np.float
     if values.size > MOST:
         return
     places = values if at is None else at
-    names = [f"{value:.0f}" if 1e4 <= abs(value) < 1e6 else f"{value:.4g}" for value in values]
+    names = [plain_number(value) for value in values]
     if flags := meanings(levels):
         names = [flags[int(value)] for value in levels.values]
     axis: Axis = getattr(ax, f"{which}axis")

@@ -11,7 +11,7 @@ import numpy as np
 from postproc.figures.drawing import Drawing
 from postproc.figures.options import spin_speed
 from postproc.figures.overlay import overlaid
-from postproc.figures.run_up_marks import title_speeds
+from postproc.figures.run_up_marks import title_of_speeds
 from postproc.figures.small_multiples import legend_below
 from postproc.signals.waveforms import DEFAULT_SIGNALS, waveform_data
 from postproc.store.units import displayed, scale_of, short_name
@@ -92,7 +92,7 @@ def draw_panels(data: xr.Dataset, axes: Sequence[Axes]) -> list[Axes]:
     if "contact_force" in data and data["contact_force"].ndim == 1:
         for ax in axes:
             shade_contacts(data["contact_force"], ax)
-    title_speeds(data, axes[0])
+    axes[0].set_title("".join(title_of_speeds(data)), fontsize=7)
     legend_below(axes[0], axes[0].get_legend_handles_labels()[0])
     return list(axes)
 

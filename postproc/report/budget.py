@@ -10,7 +10,7 @@ from postproc.report.cases import spread
 from postproc.report.detail import LEVELS
 from postproc.report.packing import pack_floats
 from postproc.report.page import Page, least_size, text_size
-from rubhpc.errors import InputError
+from rubhpc.errors import InputError, reason_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -55,7 +55,7 @@ def write_report(store: xr.Dataset, path: Path, limit: float) -> Load:
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}; choose another") from error
+        raise InputError(f"{path}: cannot be written: {reason_of(error, path)}; choose another") from error
     return load
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from postproc.report.detail import pack_case
+from postproc.store.attributes import table_of
 from postproc.store.axes import axes_of
 from postproc.store.rig_of_case import stator_places
 from postproc.store.variables import LONG_ROLES
@@ -40,8 +41,7 @@ class Cases:
         self.status = store["status"].values.ravel()
         self.done = np.flatnonzero(self.status == DONE)
         self._window = self._whole_chunks(store[kept]) if kept else [1] * len(self._axes)
-        study = store.attrs.get("study")
-        grid = study.get("grid", {}) if isinstance(study, dict) else {}
+        grid = table_of(store, "study").get("grid", {})
         self.stators_move = any(_MOVED.fullmatch(name) for name in grid)
 
     def has_record(self, flat: int) -> bool:

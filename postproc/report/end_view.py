@@ -40,7 +40,7 @@ def end_view(rig: Rig) -> str:
         line(frame.x0, frame.y(-rim) + 10, frame.x0, frame.y(rim) - 10, "axis"),
     ]
     if isinstance(rig.rotor, Rotor):
-        shaft = max(scale * max(s.outer_diameter for s in rig.rotor.shaft) / 2, 2)
+        shaft = max(scale * max(max(s.diameters[0]) for s in rig.rotor.shaft) / 2, 2)
         parts.append(f'<circle class="shaft" cx="{frame.x0:.1f}" cy="{frame.y0:.1f}" r="{shaft:.1f}"/>')
     for carrier in rig.carrier:
         carried = [
@@ -73,7 +73,7 @@ def tip_and_root(stator: AnyStator, radius: float) -> tuple[Point, Point]:
 
 def _stator(frame: Frame, stator: AnyStator, tip: Point, root: Point) -> str:
     """Return a beam, or a box for a body without a shape, turned into its place, with the wall behind it."""
-    height = stator.height if isinstance(stator, Stator) else 0.0
+    height = stator.sides[1] if isinstance(stator, Stator) else 0.0
     half = max(frame.scale * height / 2, LEAST / 2 if height else 7.0)
     deep = frame.scale * math.hypot(root[0] - tip[0], root[1] - tip[1])
     is_wall = isinstance(stator, LumpedStator) and stator.rigid

@@ -12,6 +12,7 @@ from postproc.cases.maps import VALIDITY, monitors
 from postproc.cases.saltelli import drawn_ranges
 from postproc.report.grid import plain
 from postproc.report.settings import setting_rows
+from postproc.store.attributes import table_of
 from postproc.store.axes import axes_of, drawn_axes
 from postproc.store.units import short_name
 from rubhpc.integrate.record import MOST_RESIDUAL
@@ -154,8 +155,7 @@ def drawn_rows(store: xr.Dataset) -> list[dict[str, str]]:
 
 def study_rows(store: xr.Dataset) -> list[tuple[str, str]]:
     """Return how speed, contact, integration and recording were set, from the attributes of the store."""
-    study = store.attrs.get("study")
-    return setting_rows(study) if isinstance(study, dict) else []
+    return setting_rows(table_of(store, "study"))
 
 
 def run_rows(store: xr.Dataset, measures: Measures) -> list[tuple[str, str]]:
@@ -169,8 +169,7 @@ def run_rows(store: xr.Dataset, measures: Measures) -> list[tuple[str, str]]:
         end = wrote if wrote[:10] != began[:10] else wrote[11:]
         text = f"{ranks} on {machine}; {began} to {end} ({lasted}), rubhpc {run['version']}"
         rows.append((f"Run {run['number']}", text))
-    versions = store.attrs.get("versions")
-    if isinstance(versions, dict):
+    if versions := table_of(store, "versions"):
         rows.append(("Store made with", ", ".join(f"{name} {number}" for name, number in versions.items())))
     if "wall_time" in measures.names:
         wall = measures.values("wall_time")

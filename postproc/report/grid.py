@@ -10,6 +10,7 @@ import numpy as np
 from postproc.cases.maps import MAPPABLE, VALIDITY, is_mappable, validity
 from postproc.figures.cells import cell_edges, is_geometric
 from postproc.figures.palette import categories
+from postproc.store.attributes import table_of
 from postproc.store.axes import axes_of, drawn_axes
 from postproc.store.rig_of_case import has_beams
 from postproc.store.units import displayed, meanings, short_name
@@ -187,8 +188,7 @@ def validity_text(code: int) -> str:
 
 def described_axes(store: xr.Dataset) -> list[dict[str, Any]]:
     """Return name, label, unit, values, cells and study key of each axis of the grid, in its order."""
-    study = store.attrs.get("study")
-    keys = list(study.get("grid", {})) if isinstance(study, dict) else []
+    keys = list(table_of(store, "study").get("grid", {}))
     key_of = {key.replace(".", "_"): key for key in keys}
     described = []
     for dim in axes_of(store):

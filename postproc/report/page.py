@@ -29,6 +29,7 @@ from postproc.report.linear_design import design_facts
 from postproc.report.packing import as_text
 from postproc.report.run_ups import run_up_facts
 from postproc.report.side_view import description, side_view
+from postproc.store.attributes import table_of
 from postproc.store.axes import source
 from postproc.store.branch_points import check_points
 from postproc.store.rig_of_case import natural_frequencies, rig_axes, rig_of, stator_places
@@ -109,7 +110,7 @@ class Page:
             "running": store.attrs.get("running", ""),
             "counts": counted,
             "n_case": sum(c["n"] for c in counted),
-            "rig_name": (store.attrs.get("rig") or {}).get("name", ""),
+            "rig_name": table_of(store, "rig").get("name", ""),
             "drawing": drawing,
             "rig_axes": list(rig_axes(store).values()),
             "axis_rows": [*axis_rows(axes), *drawn_rows(store)],

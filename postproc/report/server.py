@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import threading
+import time
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import TYPE_CHECKING, Any
@@ -22,8 +24,10 @@ _BINARY, _HTML = "application/octet-stream", "text/html; charset=utf-8"
 # Nothing but the page's own scripts and what this server gives; who drives a browser evaluates his own.
 _POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; "
-    "img-src data: blob:; connect-src 'self'"
+    "img-src data: blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
+_IDLE = 10.0  # s: a connection that says nothing, or takes nothing, is closed
+_FRESH = 2.0  # s for which a page is given again, or as long as it took to make it
 
 
 class Library:
@@ -33,13 +37,18 @@ class Library:
         self._open = open_now
         self._lock = threading.Lock()
         self._page = Page(open_now())
+        self._text, self._fresh_until = b"", -math.inf
 
     def page(self) -> bytes:
-        """Return the page of the store in its current state."""
-        page = Page(self._open())
-        with self._lock:
-            self._page = page
-        return page.html().encode()
+        """Return the page of the store in its current state; one that was made just now is given again."""
+        with self._lock:  # of several requests at once, one makes it
+            began = time.monotonic()
+            if began > self._fresh_until:
+                page = Page(self._open())
+                self._page, self._text = page, page.html().encode()
+                ended = time.monotonic()
+                self._fresh_until = ended + max(_FRESH, ended - began)
+            return self._text
 
     def values(self, name: str) -> bytes | None:
         """Return a measure of all cases; None where there is no such one."""
@@ -69,11 +78,11 @@ class Library:
 class _Handler(BaseHTTPRequestHandler):
     server: Server
     protocol_version = "HTTP/1.1"
+    timeout = _IDLE
 
     def do_GET(self) -> None:
         """Answer with the page, a measure or a case."""
-        # Another site's page may be led to this address by its own name; it gets nothing.
-        if self.headers.get("Host") not in (f"{HOST}:{self.server.port}", f"localhost:{self.server.port}"):
+        if not self._is_own():
             self._send(HTTPStatus.FORBIDDEN, b"only for this machine\n", "text/plain")
             return
         try:
@@ -86,6 +95,19 @@ class _Handler(BaseHTTPRequestHandler):
         else:
             self._send(HTTPStatus.OK, *answer)
 
+    def _is_own(self) -> bool:
+        """Whether a request comes from the page itself, or from who types its address.
+
+        Another site's page may be led to this address by its own name, or ask for it by this one.
+        """
+        hosts = [f"{name}:{self.server.port}" for name in (HOST, "localhost")]
+        origin = self.headers.get("Origin")
+        return (
+            self.headers.get_all("Host", []) in [[host] for host in hosts]
+            and origin in (None, *(f"http://{host}" for host in hosts))
+            and self.headers.get("Sec-Fetch-Site", "none") in ("none", "same-origin")
+        )
+
     def do_HEAD(self) -> None:
         """Answer as to GET, without the body."""
         self.do_GET()
@@ -97,6 +119,9 @@ class _Handler(BaseHTTPRequestHandler):
             ("Content-Length", str(len(body))),
             ("Content-Security-Policy", _POLICY),
             ("X-Content-Type-Options", "nosniff"),
+            ("X-Frame-Options", "DENY"),
+            ("Cross-Origin-Resource-Policy", "same-origin"),
+            ("Referrer-Policy", "no-referrer"),
             ("Cache-Control", "no-store"),
         ):
             self.send_header(name, value)

@@ -1,4 +1,4 @@
-"""The lines of a spectrum: the strongest ones, and their names as fractions of the spin speed."""
+"""The strongest lines of a spectrum, named as fractions of the spin speed where the period proves them."""
 
 from __future__ import annotations
 
@@ -11,21 +11,25 @@ import xarray as xr
 from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from numpy.typing import NDArray
 
 SPIKE = 0.004  # half width of a spike, as a part of the abscissa
-MAX_DENOMINATOR = 8  # sub-harmonics beyond the eighth cannot be distinguished from quasi-periodic lines
 _EXACT = 1e-6  # orders
+_CLOSE = 0.01  # of a frequency, up to which a natural one is near
 _NAMED = 0.25  # lines between the order of a sine and the one that it is named by, at most
 
 
-def order_name(order: float, tolerance: float = 1e-6, max_denominator: int = MAX_DENOMINATOR) -> str:
-    """Name an order by the simplest fraction within `tolerance`, as in "1/2X" or "-1X", else by decimals."""
-    for denominator in range(1, max_denominator + 1):
-        fraction = Fraction(round(order * denominator), denominator)
-        if fraction != 0 and abs(float(fraction) - order) <= tolerance:
-            return f"{fraction}X"
-    return f"{order:.2f}X"
+def order_name(order: float, tolerance: float = _EXACT, period: int = 1) -> str:
+    """Name an order as a fraction within `tolerance`, as in "1/2X" or "-1X", else by decimals.
+
+    A motion with a period of so many revolutions has lines at multiples of `1 / period` alone.
+    """
+    fraction = Fraction(round(order * period), period)
+    if fraction != 0 and abs(float(fraction) - order) <= tolerance:
+        return f"{fraction}X"
+    return f"{order:.3f}X"
 
 
 def sine_order(order: NDArray[np.float64], amplitude: NDArray[np.float64], peak: int) -> float:
@@ -47,14 +51,12 @@ def sine_order(order: NDArray[np.float64], amplitude: NDArray[np.float64], peak:
     return float(order[peak] + share * (order[higher] - order[peak]))
 
 
-def _name_line(
-    order: NDArray[np.float64], amplitude: NDArray[np.float64], peak: int, max_denominator: int
-) -> str:
-    """Name of a peak: the simple fraction at its order, or else at that of its sine, or else decimals."""
-    name = order_name(float(order[peak]), _EXACT, max_denominator)
+def _name_line(order: NDArray[np.float64], amplitude: NDArray[np.float64], peak: int, period: int) -> str:
+    """Name of a peak: the fraction at the order of its sine, or else at its own, or else decimals."""
     near = _NAMED * abs(float(order[1] - order[0]))
-    of_sine = order_name(sine_order(order, amplitude, peak), near, max_denominator)
-    return name if "." in of_sine else of_sine
+    of_sine = order_name(sine_order(order, amplitude, peak), near, period)
+    at_line = order_name(float(order[peak]), _EXACT, period)
+    return of_sine if "." in at_line else at_line if "." in of_sine else of_sine
 
 
 def parse_orders(text: str, where: str) -> list[Fraction]:
@@ -85,21 +87,25 @@ def strongest_lines(
     spectrum: xr.DataArray,
     n_line: int = 6,
     threshold: float = 0.02,
-    max_denominator: int = MAX_DENOMINATOR,
+    natural: Mapping[str, Sequence[float]] | None = None,
 ) -> xr.Dataset:
     """Return the strongest local maxima of a spectrum, strongest first, with their names.
 
     Parameters
     ----------
     spectrum : (order,)
-        One case; the mean (order 0) is no line.
+        One case; the mean (order 0) is no line. Its coordinate `period` (revolutions, `proven_period`) allows
+        fractions: without it, or where it is 0, only multiples of the spin speed are named.
     threshold : float
         Lines below this fraction of the strongest are left out.
+    natural : mapping of kind to frequencies in Hz, optional
+        Natural frequencies; the spectrum then needs the coordinate `frequency`.
 
     Returns
     -------
     Dataset over `line`
-        `order`, `amplitude`, `name`, and `frequency` (Hz) where the spectrum has it. A record that does not
+        `order`, `amplitude`, `name`, and `frequency` (Hz) where the spectrum has it; `near`: the natural
+        frequency that a line without a fraction is near, as in "torsional 39.6 Hz". A record that does not
         hold whole periods of a sine shifts its line off its order, by half a line at most; such a line is
         named by where the sine lies between it and its higher neighbour (`sine_order`).
     """
@@ -111,7 +117,8 @@ def strongest_lines(
     is_peak &= amplitude >= threshold * amplitude.max(initial=0.0)
     peaks = np.flatnonzero(is_peak)
     peaks = peaks[np.argsort(-amplitude[peaks], kind="stable")][:n_line]
-    names = [_name_line(order, amplitude, i, max_denominator) for i in peaks.tolist()]
+    period = max(int(spectrum.coords["period"]), 1) if "period" in spectrum.coords else 1
+    names = [_name_line(order, amplitude, i, period) for i in peaks.tolist()]
     lines = xr.Dataset(
         {
             "order": ("line", order[peaks], {"units": "1"}),
@@ -120,5 +127,19 @@ def strongest_lines(
         }
     )
     if "frequency" in spectrum.coords:
-        lines["frequency"] = ("line", spectrum["frequency"].values[peaks], {"units": "Hz"})
+        frequency = spectrum["frequency"].values
+        lines["frequency"] = ("line", frequency[peaks], {"units": "Hz"})
+        width = abs(float(frequency[1] - frequency[0]))
+        near = [
+            _near(abs(float(frequency[i])), width, natural or {}) if "." in name else ""
+            for i, name in zip(peaks.tolist(), names, strict=True)
+        ]
+        lines["near"] = ("line", near)
     return lines
+
+
+def _near(frequency: float, width: float, natural: Mapping[str, Sequence[float]]) -> str:
+    """Kind and value of the natural frequency (Hz) within a line's width of a frequency; "" for none."""
+    all_of_them = [(abs(value - frequency), kind, value) for kind in natural for value in natural[kind]]
+    distance, kind, value = min(all_of_them, default=(np.inf, "", 0.0))
+    return f"{kind} {value:.4g} Hz" if distance <= max(width, _CLOSE * frequency) else ""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -54,7 +54,8 @@ def order_over_speed(
         shaft's angle, unwrapped, over `speed` (rad/s), rising, and `over`; of run-ups over `revolution`, with
         `speed` as a variable. Where the phase of a run-up jumps, the order is lost in other motion, and the
         phase is NaN; so are both at its ends, in revolutions that have the window of a later or earlier one.
-        Where there is no more of the order than rounding, it has no phase either.
+        Where there is no more of the order than rounding, it has no phase either. `contact_fraction`, where
+        it is known, is the largest of the stators.
 
     Raises
     ------
@@ -149,9 +150,11 @@ def _of_run_up(store: xr.Dataset, signals: Sequence[str], order: float, over: st
                 str(n).removeprefix("phase_") for n in store.data_vars if str(n).startswith("phase_")
             )
             raise InputError(f"{name.split('_', 1)[1]}: no order of it is followed; choose one of {known}")
+    store, others = _with_contact(store, ["revolution_contact_fraction", "contact_fraction"])
+    others = ["speed", *others]
     if "status" in store:
-        store = narrow(store, [*names, "speed"], [find_axis(store, over)] if over else [])
-    rows = store[[*names, "speed"]].isel(order=int(near[0]))
+        store = narrow(store, [*names, *others], [find_axis(store, over)] if over else [])
+    rows = store[[*names, *others]].isel(order=int(near[0]))
     rows = rows.drop_vars(["order", "stator"], errors="ignore").load()
     turn, last = np.arange(rows.sizes["revolution"]), rows["speed"].notnull().sum("revolution")
     within = xr.DataArray(turn, dims="revolution")
@@ -159,13 +162,23 @@ def _of_run_up(store: xr.Dataset, signals: Sequence[str], order: float, over: st
     return rows.assign({name: rows[name].where(is_own | (last <= WINDOW)) for name in names})
 
 
+def _with_contact(store: xr.Dataset, names: Sequence[str]) -> tuple[xr.Dataset, list[str]]:
+    """Return the store with the largest `contact_fraction` of its stators, and that name; [] if unknown."""
+    shares = [store[name] for name in names if name in store]
+    if not shares:
+        return store, []
+    largest = shares[0].max([dim for dim in ("stator",) if dim in shares[0].dims])
+    return store.assign(contact_fraction=largest), ["contact_fraction"]
+
+
 def _of_cases(store: xr.Dataset, signals: Sequence[str], order: float, over: str | None) -> xr.Dataset:
     along = next((axis for axis in axes_of(store) if axis in SPEED_AXES), None)
     if along is None or store.sizes[along] < 2:
         raise InputError(f"{source(store)}: bode needs an axis of several speeds; give another store")
     spread = [along, *([find_axis(store, over)] if over else [])]
-    data = narrow(store, [*signals, "spin_speed"], spread).load()
-    variables = {}
+    store, touched = _with_contact(store, ["contact_fraction"])
+    data = narrow(store, [*signals, *touched, "spin_speed"], spread).load()
+    variables: dict[str, Any] = {name: data[name] for name in touched}
     for signal in signals:
         n = samples_per_revolution(data[signal])
         turns = data.sizes["sample"] // n

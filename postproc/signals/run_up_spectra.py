@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from postproc.signals.spectra import check_signal
+from postproc.signals.spectra import WHIRL, check_signal
 from postproc.store.axes import source
-from postproc.store.run_ups import is_run_up
+from postproc.store.run_ups import first_around, is_run_up
 from postproc.store.select import narrow
 from rubhpc.errors import InputError
 from rubhpc.schema import TURNED
@@ -26,12 +26,20 @@ FEWEST = 8  # revolutions in which a spectrum separates 1X and 1/2X
 MEANS = 6  # revolutions, whole periods of 1/2X and 1/3X
 
 
-def run_up_spectra(store: xr.Dataset, signal: str, window: int, count: int) -> xr.Dataset:
+def run_up_spectra(
+    store: xr.Dataset, signal: str, window: int, count: int, at: float | None = None
+) -> xr.Dataset:
     """Return amplitude spectra of a run-up at `count` places, each over `window` revolutions, loaded.
 
     A window is at most half of the run-up, but for one of less than twice `FEWEST` revolutions.
 
-    Windows are Hann's: a line of a steady amplitude has its height, zero to peak.
+    Windows are Hann's: a line of a steady amplitude has its height, zero to peak. Those of the "whirl" are
+    full spectra, as of `full_spectrum`.
+
+    Parameters
+    ----------
+    at : float, optional
+        rad/s; the one spectrum around this speed, where it is first reached, in place of `count`.
 
     Returns
     -------
@@ -44,26 +52,29 @@ def run_up_spectra(store: xr.Dataset, signal: str, window: int, count: int) -> x
     InputError
         It is no run-up of one case, has no more than `FEWEST` revolutions or no such signal.
     """
-    data, per_revolution, n = _case(store, [signal])
+    is_full = signal == WHIRL
+    data, per_revolution, n = _case(store, ["vertical", "horizontal"] if is_full else [signal])
     if n <= FEWEST:
         problem = f"this run-up has {n} revolutions, too few for spectra over its speed"
         raise InputError(f"{source(store)}: {problem}; draw it with rubhpc waveform")
     window = min(window, max(n // 2, FEWEST))
-    signal_rows = data[signal].values.astype(float)[: n * per_revolution]
     speed = data["speed"].values[:n]
-    shape = 0.5 - 0.5 * np.cos(
-        2.0 * np.pi * (np.arange(window * per_revolution) + 0.5) / (window * per_revolution)
-    )
     starts = np.unique(np.linspace(0, n - window, count).round().astype(int))
+    if at is not None:
+        starts = np.array([first_around(store, speed, window, at)])
+    values = data["vertical"].values + 1j * data["horizontal"].values if is_full else data[signal].values
+    n_sample = window * per_revolution
+    shape = 0.5 - 0.5 * np.cos(2.0 * np.pi * (np.arange(n_sample) + 0.5) / n_sample)
     rows, speeds = [], []
     for first in starts:
-        part = signal_rows[first * per_revolution : (first + window) * per_revolution]
-        rows.append(np.abs(np.fft.rfft((part - part.mean()) * shape)) * 2.0 / shape.sum())
+        part = values[first * per_revolution : (first + window) * per_revolution]
+        part = (part - part.mean()) * (shape / shape.sum())
+        rows.append(np.abs(np.fft.fftshift(np.fft.fft(part)) if is_full else 2.0 * np.fft.rfft(part)))
         speeds.append(window / np.sum(1.0 / speed[first : first + window]))
-    order = np.arange(rows[0].size) / window
-    about = data[signal].attrs
+    order = (np.arange(rows[0].size) - (n_sample // 2 if is_full else 0)) / window
+    about = data["vertical" if is_full else signal].attrs
     found = xr.Dataset(
-        {"amplitude": (("place", "order"), np.array(rows), {"units": about.get("units", "1")})},
+        {"amplitude": (("place", "order"), np.array(rows), dict(about))},
         coords={name: at for name, at in data.coords.items() if at.ndim == 0}
         | {
             "order": ("order", order, {"units": "1", "long_name": "order of the spin frequency"}),
@@ -76,7 +87,8 @@ def run_up_spectra(store: xr.Dataset, signal: str, window: int, count: int) -> x
             ),
         },
     )
-    found["amplitude"].attrs["long_name"] = about.get("long_name", signal)
+    if is_full:
+        found["amplitude"].attrs["long_name"] = "whirl amplitude"
     return found
 
 

@@ -65,7 +65,7 @@ def full_spectrum(vertical: xr.DataArray, horizontal: xr.DataArray) -> xr.DataAr
     orders = np.fft.fftshift(np.fft.fftfreq(n, d=1 / samples_per_revolution(vertical)))
     spectrum = _over_orders(_two_sided, orders, vertical, horizontal)
     spectrum.name = WHIRL
-    spectrum.attrs = {"units": vertical.attrs.get("units", "m"), "long_name": "whirl amplitude"}
+    spectrum.attrs = {**vertical.attrs, "long_name": "whirl amplitude"}
     return spectrum
 
 
@@ -137,8 +137,24 @@ def spectrum_data(store: xr.Dataset, signal: str, over: str | None = None) -> xr
     store : Dataset
         One case (and one stator, for a stator's signals), or cases along the axis `over`.
     """
-    spectrum, data = periodic_spectrum(store, signal, [find_axis(store, over)] if over else [])
+    spread = [find_axis(store, over)] if over else []
+    spectrum, data = periodic_spectrum(store, signal, spread)
+    period = proven_period(store, spread)
+    if period is not None:
+        spectrum = spectrum.assign_coords(period=period)
     return with_frequency(spectrum, data["spin_speed"].compute())
+
+
+def proven_period(store: xr.Dataset, spread: Iterable[str] = ()) -> xr.DataArray | None:
+    """Return the revolutions after which each case repeats, 0 where it does not or had not settled.
+
+    None for a store without periods.
+    """
+    if "period" not in store:
+        return None
+    data = narrow(store, [name for name in ("period", "settled") if name in store], spread).compute()
+    is_settled = data["settled"] != 0 if "settled" in data else True
+    return data["period"].where(is_settled, 0).drop_attrs()
 
 
 def with_frequency(spectrum: xr.DataArray, spin_speed: xr.DataArray) -> xr.DataArray:
@@ -147,21 +163,6 @@ def with_frequency(spectrum: xr.DataArray, spin_speed: xr.DataArray) -> xr.DataA
     frequency = (rate * spectrum["order"]).assign_attrs(units="Hz", long_name="frequency")
     dims = [d for d in spectrum.dims if d in frequency.dims]
     return spectrum.assign_coords(frequency=frequency.transpose(*dims))
-
-
-def signal_or_whirl(signal: str, full: bool) -> str:
-    """Return the name of what is drawn: the whirl for a full spectrum, which has no other signal.
-
-    Raises
-    ------
-    InputError
-        A full spectrum, and a signal other than torsion, the default of the figures.
-    """
-    if full and signal not in ("torsion", WHIRL):
-        raise InputError(
-            f"--full is of the orbit and conflicts with --signal {signal}; leave out one of them"
-        )
-    return WHIRL if full else signal
 
 
 def check_signal(signal: str, store: xr.Dataset | None = None) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 from typing import TYPE_CHECKING
 
+from postproc.store.attributes import table_of
 from rubhpc.errors import InputError
 from rubhpc.study.axes import coordinate_of
 from rubhpc.study.sampling import CASE
@@ -43,8 +44,7 @@ def drawn_axes(store: xr.Dataset) -> list[str]:
     """Return the coordinates that a sampled study has drawn, in the order of its grid; [] of a grid."""
     if CASE not in axes_of(store):
         return []
-    study = store.attrs.get("study")
-    keys = [coordinate_of(key) for key in study["grid"]] if isinstance(study, dict) else []
+    keys = [coordinate_of(key) for key in table_of(store, "study").get("grid", {})]
     drawn = [str(name) for name, at in store.coords.items() if at.dims == (CASE,) and name != CASE]
     return sorted(drawn, key=lambda name: keys.index(name) if name in keys else len(keys))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
+from postproc.store.attributes import table_of
 from postproc.store.axes import source
 from rubhpc.errors import InputError
 from rubhpc.schema import BRANCH_EVENT, POINT
@@ -20,7 +21,7 @@ def is_of_points(store: xr.Dataset) -> bool:
 
 def followed(store: xr.Dataset) -> str:
     """Return the coordinate along which branches were followed."""
-    return str(store.attrs["study"]["branch"]["along"]).replace(".", "_")
+    return str(table_of(store, "study")["branch"]["along"]).replace(".", "_")
 
 
 def other_axes(points: xr.Dataset) -> list[str]:
@@ -73,20 +74,20 @@ def as_points(store: xr.Dataset) -> xr.Dataset:
     cases = [str(dim) for dim in store["status"].dims]
     along = followed(store)
     names = [str(name) for name in store.data_vars if str(name).startswith(POINT)]
-    held = store[[*names, "status"]].load()
-    coords = {d: held[d] for d in cases if d != along}
-    is_there = held[f"{POINT}value"].notnull().transpose(*cases, "point").values
+    status = store["status"].values
+    coords = {d: store[d] for d in cases if d != along}
+    is_there = store[f"{POINT}value"].notnull().transpose(*cases, "point").values
     where = np.nonzero(is_there)
     picked = {}
     for name in names:
-        values = held[name].transpose(*cases, "point", ...)
+        values = store[name].transpose(*cases, "point", ...)  # read one at a time: few hold points
         short = name.removeprefix(POINT)
         data = values.values[where]
         if short in _WHOLE:
             data = np.where(np.isfinite(data), data, -1).astype(_WHOLE[short])
         picked[short] = (("point", *values.dims[len(cases) + 1 :]), data, dict(values.attrs))
     value = picked.pop("value")
-    picked["status"] = (("point",), held["status"].values[where[:-1]], dict(held["status"].attrs))
+    picked["status"] = (("point",), status[where[:-1]], dict(store["status"].attrs))
     points = xr.Dataset(picked, attrs=store.attrs)
     axis = {along: ("point", value[1], dict(store[along].attrs))}
     for dim, values in coords.items():

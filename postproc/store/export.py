@@ -8,7 +8,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rubhpc.errors import InputError
+from rubhpc.errors import InputError, reason_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -59,7 +59,7 @@ def write_data(data: xr.Dataset, path: str | Path) -> Path:
             write_hdf5(data, path)
     except OSError as error:
         raise InputError(
-            f"{path}: cannot be written: {error.strerror or error}; choose another --data"
+            f"{path}: cannot be written: {reason_of(error, path)}; choose another --data"
         ) from error
     return path
 

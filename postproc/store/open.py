@@ -6,15 +6,18 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from postproc.store.attributes import with_sound_attributes
 from postproc.store.axes import drawn_axes
 from postproc.store.branch_points import as_points
 from postproc.store.inferred import fill_inferred
 from postproc.store.run_ups import as_run_ups, is_run_up
 from postproc.store.variables import SIGNAL_ROLES
 from rubhpc.errors import StoreError
+from rubhpc.input.array_files import CHECKED
 from rubhpc.schema import POINT, TURNED, VARIABLES, role_of
-from rubhpc.storage.regular_files import CHECKED, RegularFiles
+from rubhpc.storage.regular_files import RegularFiles
 from rubhpc.storage.store import is_damaged
+from rubhpc.study.points import MOST_CASES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -55,18 +58,16 @@ def open_store(path: str | Path) -> xr.Dataset:
     if "status" not in store:
         raise StoreError(f"{path}: is not a rubhpc store; give the directory that a study was run into")
     store.encoding["source"] = str(path)
-    _check_attributes(store, path)
+    if is_damaged(path):
+        raise StoreError(f"{path}: its metadata are damaged; run its study again to repair them")
+    if store["status"].size > MOST_CASES:
+        raise StoreError(
+            f"{path}: states {store['status'].size} cases, more than a store can have; get it anew"
+        )
+    store = with_sound_attributes(store, path)
     if f"{POINT}value" in store:
         return as_points(store)
     return as_run_ups(store) if is_run_up(store) else fill_inferred(store, path)
-
-
-def _check_attributes(store: xr.Dataset, path: Path) -> None:
-    """Refuse attributes of other types than a run writes."""
-    study = store.attrs.get("study", {})
-    tables = (study, store.attrs.get("rig", {}), study.get("grid", {}) if isinstance(study, dict) else {})
-    if is_damaged(path) or not all(isinstance(table, dict) for table in tables):
-        raise StoreError(f"{path}: its metadata are damaged; run its study again to repair them")
 
 
 def _open(path: Path, chunks: Any, without: Sequence[str] = ()) -> xr.Dataset:
@@ -80,6 +81,8 @@ def _open(path: Path, chunks: Any, without: Sequence[str] = ()) -> xr.Dataset:
         store = xr.open_zarr(
             RegularFiles(path),
             chunks=chunks,
+            zarr_format=3,
+            mask_and_scale=False,
             drop_variables=list(without),
             decode_times=False,
             decode_timedelta=False,

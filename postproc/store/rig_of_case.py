@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import xarray as xr
 
+from postproc.store.attributes import table_of
 from postproc.store.axes import source
 from rubhpc.errors import InputError
 from rubhpc.rig.reading import rig_from_dict, with_keys
@@ -34,8 +35,8 @@ def rig_of(case: xr.Dataset, values: Mapping[str, float] | None = None) -> Rig:
     InputError
         The store contains no rig, or one that this version cannot read.
     """
-    table = case.attrs.get("rig")
-    if not isinstance(table, dict):
+    table = table_of(case, "rig")
+    if not table:
         raise InputError(f"{source(case)}: contains no rig; give a store that rubhpc has written")
     rig = rig_from_dict(table, f"{source(case)}: rig")
     chosen = {
@@ -57,6 +58,18 @@ def natural_frequencies(case: xr.Dataset, along: str | None = None) -> dict[str,
     from rubhpc.fem.modes import modes
 
     return _over_rig(case, along, lambda rig: _first_of_kinds(modes(assemble(rig).rotor), ROTOR_MODES))
+
+
+def frequencies_at_speed(case: xr.Dataset, spin: float) -> dict[str, list[float]]:
+    """Return the natural frequencies (Hz) of the rotor of a case at a speed (rad/s), by kind."""
+    from rubhpc.fem.assemble import assemble
+    from rubhpc.fem.modes import modes
+
+    found: dict[str, list[float]] = {}
+    for mode in modes(assemble(rig_of(case)).rotor, spin):
+        if mode.frequency > 0.0:
+            found.setdefault(mode.kind, []).append(mode.frequency)
+    return found
 
 
 def stator_frequencies(case: xr.Dataset, along: str | None = None) -> dict[str, xr.DataArray]:
@@ -99,34 +112,42 @@ def _over_rig(
     }
 
 
-def stator_places(case: xr.Dataset) -> list[tuple[float, float]]:
-    """Return angle (rad, from straight up with the spin) and clearance offset (m) of the stators at the disc.
+def recorded_node(case: xr.Dataset) -> int:
+    """Return the node whose motion is recorded: that of the first stator, unless the rotor names another."""
+    rig = rig_of(case)
+    return rig.rotor.recorded_node([stator.node for stator in rig.stator])
 
-    The disc is the one whose motion is recorded, at the node of the first stator; others touch another disc.
+
+def stators_around(case: xr.Dataset) -> list[int]:
+    """Return which stators, from 0, stand around the node whose motion is drawn; others touch another disc.
+
+    It is the recorded one, unless the attribute `node` of the case names another.
     """
     if "rig" not in case.attrs:
         return []
-    stators = rig_of(case).stator
-    return [(s.angle, s.clearance_offset) for s in stators if s.node == stators[0].node]
+    node = case.attrs["node"] if "node" in case.attrs else recorded_node(case)
+    return [i for i, stator in enumerate(rig_of(case).stator) if stator.node == node]
+
+
+def stator_places(case: xr.Dataset) -> list[tuple[float, float]]:
+    """Return angle (rad, from straight up with the spin) and clearance offset (m) of the stators around."""
+    around = stators_around(case)
+    return [(s.angle, s.clearance_offset) for s in (rig_of(case).stator[i] for i in around)]
 
 
 def has_beams(case: xr.Dataset) -> bool:
     """Whether a stator is a beam, with a length and an Euler load; true where no rig says otherwise."""
-    if not isinstance(case.attrs.get("rig"), dict):
+    if not table_of(case, "rig"):
         return True
     return any(isinstance(stator, Stator) for stator in rig_of(case).stator)
 
 
 def is_carried(case: xr.Dataset) -> bool:
-    """Whether stators at the disc stand on a carrier, with which they move."""
-    if "rig" not in case.attrs:
-        return False
-    stators = rig_of(case).stator
-    return any(s.carrier is not None for s in stators if s.node == stators[0].node)
+    """Whether stators around the node whose motion is drawn stand on a carrier, with which they move."""
+    return any(rig_of(case).stator[i].carrier is not None for i in stators_around(case))
 
 
 def rig_axes(case: xr.Dataset) -> dict[str, str]:
     """Return the axes of the study that are keys of the rig: coordinate to dotted key."""
-    study: dict[str, Any] = case.attrs.get("study", {})
-    keys = (name for name in study.get("grid", {}) if "." in name and not is_of_table(name))
+    keys = (name for name in table_of(case, "study").get("grid", {}) if "." in name and not is_of_table(name))
     return {coordinate_of(key): key for key in keys}

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from postproc.store.axes import source
 from rubhpc.errors import InputError
 from rubhpc.schema import TURNED
+from rubhpc.units import RPM
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import xarray as xr
+    from numpy.typing import NDArray
 
 _CONTACT = ("peak_contact_force", "contact_force")  # by which the most loaded stator is chosen
 STEADY = (  # measures of a motion at one speed, which run-ups lack
@@ -52,7 +56,7 @@ def steady_view(store: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
         The figure needs one speed.
     """
     if "spin_speed" in names or any(name.startswith("spectrum_") for name in names):
-        fix = "draw it with rubhpc waterfall or rubhpc bode"
+        fix = "draw it with rubhpc waterfall, bode, or spectrum --at SPEED"
         raise InputError(f"{source(store)}: the speed changes, and this figure needs a constant one; {fix}")
     if any("revolution" in store[name].dims for name in names if name in store):
         return store
@@ -62,6 +66,28 @@ def steady_view(store: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
     seen = kept.rename({TURNED: "revolution"}) if TURNED in kept.coords else kept
     seen.encoding.update(store.encoding)
     return seen
+
+
+def first_around(store: xr.Dataset, speed: NDArray[np.float64], count: int, at: float) -> int:
+    """Return the first of `count` revolutions around the one that first has the speed `at`, rad/s.
+
+    Parameters
+    ----------
+    speed : (n_revolution,), rad/s
+        Of one run-up of the store.
+
+    Raises
+    ------
+    InputError
+        The run-up does not pass the speed.
+    """
+    step, low, high = float(np.abs(np.diff(speed)).max(initial=0.0)), float(speed.min()), float(speed.max())
+    if not low - step <= at <= high + step:
+        given, least, most = (f"{RPM.factor * value:.6g}" for value in (at, low, high))
+        problem = f"{given} rpm is none of its speeds, {least} to {most} rpm"
+        raise InputError(f"{source(store)}: at: {problem}; give one of these")
+    first = int(np.argmin(np.abs(speed - at))) - count // 2
+    return int(np.clip(first, 0, speed.size - count))
 
 
 def measures_alone(store: xr.Dataset) -> xr.Dataset:

@@ -7,12 +7,12 @@ import re
 from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from rubhpc.schema import PROBE
 from rubhpc.units import RPM, scale_for
 
 if TYPE_CHECKING:
-    import xarray as xr
     from numpy.typing import NDArray
 
     from rubhpc.units import Scale
@@ -91,6 +91,10 @@ _SYMBOLS = {
 }
 
 
+_RATIOS = {
+    "speed_ratio": "$r$: spin speed over first lateral frequency",
+    "clearance_ratio": "$c_g$: clearance over contact-free amplitude",
+}
 _SPEEDS = ("speed", "spin_speed", "last_speed", "drive_start")
 _CAPTION_WIDTH = 56  # characters that a column takes
 _MARKUP = re.compile(r"[$\\_]")  # of symbols, which takes no room
@@ -140,19 +144,32 @@ def written_value(coordinate: xr.DataArray) -> str:
         return f"{name.replace('_', ' ')} = {math.degrees(value):.4g}°"
     scale = RPM if name in _SPEEDS else scale_for(unit, abs(value))
     symbol = f"${_SYMBOLS[name]}$" if name in _SYMBOLS else name.replace("run_up", "run-up").replace("_", " ")
-    text = f"{symbol} = {value * scale.factor:.4g} {scale.unit}".rstrip()
+    text = f"{symbol} = {plain_number(value * scale.factor)} {scale.unit}".rstrip()
     return f"{text} ({of_stators})" if (of_stators := coordinate.attrs.get("of_stators")) else text
 
 
+def plain_number(value: float, digits: int = 4) -> str:
+    """Write a number to so many digits, up to a million without an exponent: 10000, 12.35."""
+    is_long = 10**digits - 0.5 <= abs(value) < 1e6
+    return f"{value:.0f}" if is_long else f"{value:.{digits}g}"
+
+
 def caption(data: xr.DataArray | xr.Dataset) -> str:
-    """Return the settings that hold for all of `data`: its scalar coordinates, in lines that fit a column."""
+    """Return what holds for all of `data`, in lines that fit a column.
+
+    That is its scalar coordinates, the places of its signals (their attribute `place`) and what the ratios
+    among its coordinates are.
+    """
     scalars = [c for c in data.coords.values() if c.ndim == 0 and c.dtype.kind in "fiu"]
     known = list(_SYMBOLS)
     scalars.sort(key=lambda c: (known.index(c.name) if c.name in known else len(known), str(c.name)))
+    signals = [data] if isinstance(data, xr.DataArray) else data.data_vars.values()
+    places = dict.fromkeys(str(signal.attrs["place"]) for signal in signals if "place" in signal.attrs)
+    ratios = (text for name, text in _RATIOS.items() if name in data.coords)
     lines: list[str] = []
-    for setting in map(written_value, scalars):
-        if lines and len(_MARKUP.sub("", f"{lines[-1]}, {setting}")) <= _CAPTION_WIDTH:
-            lines[-1] = f"{lines[-1]}, {setting}"
+    for part in (*map(written_value, scalars), *places, *ratios):
+        if lines and len(_MARKUP.sub("", f"{lines[-1]}, {part}")) <= _CAPTION_WIDTH:
+            lines[-1] = f"{lines[-1]}, {part}"
         else:
-            lines.append(setting)
+            lines.append(part)
     return ",\n".join(lines)

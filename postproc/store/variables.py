@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from postproc.store.attributes import table_of
 from postproc.store.axes import source
 from rubhpc.errors import InputError
 from rubhpc.schema import PROBE, VARIABLES, role_of
@@ -34,7 +35,8 @@ def require_variables(store: xr.Dataset, names: Iterable[str]) -> None:
     for name in names:
         if name in store:
             continue
-        role = role_of(name) if name in VARIABLES else ""  # no probe needs to be there
+        is_recorded = name in VARIABLES or name.removeprefix(PROBE) in probes_of(store)
+        role = role_of(name) if is_recorded else ""
         if role in LONG_ROLES:
             fix = f'run the study with "{role}" in [record] keep'
             raise InputError(f"{source(store)}: does not contain {name}; {fix}")
@@ -61,8 +63,7 @@ def require_results(values: ArrayLike, store: xr.Dataset) -> None:
 
 def probes_of(store: xr.Dataset) -> dict[str, dict[str, Any]]:
     """Return the probes of a store by name, each with the keys of its table of the study, in SI."""
-    study = store.attrs.get("study")
-    record = study.get("record", {}) if isinstance(study, dict) else {}
+    record = table_of(store, "study").get("record", {})
     return {probe["name"]: probe for probe in record.get("probe", [])}
 
 

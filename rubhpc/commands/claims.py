@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from rubhpc.errors import InputError
+from rubhpc.errors import InputError, reason_of
 
 FOLDER = "paper"  # where the studies of jobs/paper put their stores
 
@@ -52,6 +52,8 @@ def claims(number: int | None, stores: str, is_json: bool, document: str | None,
 
 def _write(path: Path, content: str) -> None:
     try:
-        path.write_text(content)
+        path.write_text(content, encoding="utf-8")
     except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}; choose another --document") from error
+        raise InputError(
+            f"{path}: cannot be written: {reason_of(error, path)}; choose another --document"
+        ) from error

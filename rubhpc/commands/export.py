@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from rubhpc.commands.selection import SELECT, open_cases
-from rubhpc.errors import InputError
+from rubhpc.errors import InputError, reason_of
 
 
 @click.command()
@@ -42,6 +42,6 @@ def export(store: str, selection: tuple[str, ...], names: tuple[str, ...], outpu
         else:
             write_hdf5(cases[list(names)] if names else cases, path)
     except OSError as error:
-        reason = error.strerror or error
+        reason = reason_of(error, path)
         raise InputError(f"{path}: cannot be written: {reason}; choose another --output") from error
     click.echo(f"{path} ({path.stat().st_size / 1e6:.1f} MB)")

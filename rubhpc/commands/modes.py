@@ -81,6 +81,7 @@ def modes(
     from postproc.store.export import check_data_path, write_data
     from rubhpc.commands.design import plain_design, print_design
     from rubhpc.fem.assemble import assemble
+    from rubhpc.fem.constraints import FLOATS, find_rigid_body_mode
     from rubhpc.fem.lasting import undamped_message
     from rubhpc.fem.linear_design import linear_design
     from rubhpc.fem.modes import modes as find_modes
@@ -101,6 +102,8 @@ def modes(
     stators = [find_modes(stator.held.body)[:count] for stator in model.stators]
     carriers = [(carrier, find_modes(carrier.body)[:count]) for carrier in model.carriers]
     found = [(spin, find_modes(model.rotor, spin)[:count]) for spin in spins]
+    if find_rigid_body_mode(model) == FLOATS:
+        click.echo(f"warning: {FLOATS}, and some of its modes have no frequency", err=True)
     for spin in spins:
         if message := instability_message(model, spin):
             click.echo(f"warning: {message}", err=True)

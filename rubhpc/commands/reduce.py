@@ -89,7 +89,10 @@ def reduce(
     if on == "mpi":
         from rubhpc.running.launch import move_to
 
-        become_rank_of_cluster()
+        try:
+            become_rank_of_cluster()
+        except SystemExit as ended:  # of the scheduler and the workers, when the command has ended
+            raise click.exceptions.Exit(0) from ended
         move_to(0, 1)  # the only rank that is left to print
     stem = f"{Path(store).resolve().stem}_{what}"
     data_path = check_data_path(data or f"{stem}.nc")

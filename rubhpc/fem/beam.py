@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.rig.parts import ShaftSection
     from rubhpc.rig.stators import Stator
+    from rubhpc.rig.tubes import Tube
 
     Matrix = NDArray[np.float64]
 
@@ -164,30 +164,108 @@ def _symmetric(a: float, b: float, c: float, d: float, e: float, f: float) -> Ma
     return np.array([[a, c, b, -d], [c, e, d, f], [b, d, a, -c], [-d, f, -c, e]])
 
 
-def rotor_element(section: ShaftSection) -> Element:
-    """Return the element of a shaft section: (12, 12), degrees `ROTOR_DEGREES` at each node.
+def rotor_elements(tube: Tube, lengths: Sequence[float]) -> list[Element]:
+    """Return the elements of a shaft section or sleeve that is cut into `lengths` (m), from its left end.
 
-    The slope of v is `thz`, that of w is `-thy`. A slice of a round shaft has Ip = 2 Id, so by
-    `Id thy'' + spin Ip thz' = My` and `Id thz'' - spin Ip thy' = Mz`, the equations of a disc, the gyroscopic
-    matrix is twice the rotary mass matrix, between the two planes.
+    They are (12, 12), with degrees `ROTOR_DEGREES` at each node. The slope of v is `thz`, of w `-thy`. A
+    slice of a round shaft has Ip = 2 Id, so by `Id thy'' + spin Ip thz' = My` and
+    `Id thz'' - spin Ip thy' = Mz`, the equations of a disc, the gyroscopic matrix is twice the rotary mass
+    matrix, between the two planes.
     """
-    L = section.length / section.elements
-    outer, inner = section.outer_diameter, section.inner_diameter
+    outer, inner = tube.diameters
+    if outer[0] == outer[1] and inner[0] == inner[1]:
+        of_length = {length: _cylinder(tube, length) for length in set(lengths)}
+        return [of_length[length] for length in lengths]
+    cuts = np.cumsum([0.0, *lengths]) / sum(lengths)
+    ends = [tuple(np.interp(cuts, [0.0, 1.0], pair).tolist()) for pair in (outer, inner)]
+    return [
+        _cone(tube, length, (ends[0][i], ends[0][i + 1]), (ends[1][i], ends[1][i + 1]))
+        for i, length in enumerate(lengths)
+    ]
+
+
+def _cylinder(tube: Tube, L: float) -> Element:
+    """Return the element of a cylinder of the length L, m."""
+    outer, inner = tube.outer_diameter, tube.inner_diameter
     area = math.pi / 4 * (outer**2 - inner**2)
     second_moment = math.pi / 64 * (outer**4 - inner**4)
-    E, G, rho = section.youngs_modulus, section.shear_modulus, section.density
+    E, G, rho = tube.youngs_modulus, tube.modulus_in_shear, tube.density
     shear_rigidity = math.inf
-    if section.shear:
+    if tube.shear:
         shear_rigidity = shear_coefficient_circle(E / (2 * G) - 1, inner / outer) * G * area
-    translational, rotary, flexural = bending(
-        L, E * second_moment, shear_rigidity, rho * area, rho * second_moment
+    planar = bending(L, E * second_moment, shear_rigidity, rho * area, rho * second_moment)
+    polar = 2 * second_moment
+    return _in_space(*planar, bar(L, E * area, rho * area), bar(L, G * polar, rho * polar))
+
+
+def _cone(tube: Tube, L: float, outer: tuple[float, float], inner: tuple[float, float]) -> Element:
+    """Return the element of a tapered part of the length L, m, with the diameters at its ends.
+
+    Energies are integrated, exactly by Gauss's points, over the deflections of a uniform beam with the shear
+    parameter of the middle: G. Genta, A. Gugliotta, J. Sound Vib. 120 (1988) 175-182.
+    """
+    E, G, rho = tube.youngs_modulus, tube.modulus_in_shear, tube.density
+    place, weight = np.polynomial.legendre.leggauss(5)
+    x, weight = (1 + place) / 2, weight / 2
+    d, bore = (ends[0] + (ends[1] - ends[0]) * x for ends in (outer, inner))
+    area = math.pi / 4 * (d**2 - bore**2)
+    second = math.pi / 64 * (d**4 - bore**4)
+    phi, shear = 0.0, np.zeros_like(x)
+    if tube.shear:
+        shear = shear_coefficient_circle(E / (2 * G) - 1, sum(inner) / sum(outer)) * G * area
+        middle = math.pi / 64 * ((sum(outer) / 2) ** 4 - (sum(inner) / 2) ** 4)
+        phi = 12 * E * middle / (float(shear[2]) * L**2)  # the third of five points is the middle
+    one = np.ones_like(x)
+    deflection = np.array([
+        1 - 3 * x**2 + 2 * x**3 + phi * (1 - x),
+        L * (x - 2 * x**2 + x**3 + phi / 2 * (x - x**2)),
+        3 * x**2 - 2 * x**3 + phi * x,
+        L * (x**3 - x**2 - phi / 2 * (x - x**2)),
+    ]) / (1 + phi)  # fmt: skip
+    rotation = np.array([
+        6 / L * (x**2 - x),
+        1 - 4 * x + 3 * x**2 + phi * (1 - x),
+        6 / L * (x - x**2),
+        3 * x**2 - 2 * x + phi * x,
+    ]) / (1 + phi)  # fmt: skip
+    curvature = np.array([
+        6 / L * (2 * x - 1),
+        6 * x - 4 - phi,
+        6 / L * (1 - 2 * x),
+        6 * x - 2 + phi,
+    ]) / (L * (1 + phi))  # fmt: skip
+    strain = -phi / (1 + phi) * np.array([one / L, one / 2, -one / L, one / 2])
+
+    def over(shape: Matrix, density: Matrix) -> Matrix:
+        result: Matrix = (shape * (L * weight * density)) @ shape.T
+        return result
+
+    def rod(rigidity: Matrix, inertia: Matrix) -> tuple[Matrix, Matrix]:
+        return over(np.array([1 - x, x]), inertia), over(np.array([-one / L, one / L]), rigidity)
+
+    flexural = over(curvature, E * second) + over(strain, shear)
+    polar = 2 * second
+    return _in_space(
+        over(deflection, rho * area),
+        over(rotation, rho * second),
+        flexural,
+        rod(E * area, rho * area),
+        rod(G * polar, rho * polar),
     )
 
+
+def _in_space(
+    translational: Matrix,
+    rotary: Matrix,
+    flexural: Matrix,
+    tension: tuple[Matrix, Matrix],
+    torsion: tuple[Matrix, Matrix],
+) -> Element:
+    """Return the element of a shaft from matrices in one plane (4, 4), in tension and torsion (2, 2)."""
     mass, gyroscopic, stiffness = np.zeros((3, 12, 12))
-    polar = 2 * second_moment
-    for first, rigidity, inertia in ((0, E * area, rho * area), (3, G * polar, rho * polar)):
+    for first, (inertia, rigidity) in ((0, tension), (3, torsion)):
         rows = np.ix_((first, first + 6), (first, first + 6))
-        mass[rows], stiffness[rows] = bar(L, rigidity, inertia)
+        mass[rows], stiffness[rows] = inertia, rigidity
 
     vertical, horizontal = [1, 5, 7, 11], [2, 4, 8, 10]
     sign = np.array([1.0, -1.0, 1.0, -1.0])  # of the rotation: thz in the x-y plane, -thy in the x-z plane
@@ -204,8 +282,7 @@ def rotor_element(section: ShaftSection) -> Element:
 def stator_element(stator: Stator) -> Element:
     """Return the element of a stator: (6, 6), degrees `STATOR_DEGREES` at each node, from root to tip."""
     L = stator.length / stator.elements
-    area = stator.width * stator.height
-    second_moment = stator.width * stator.height**3 / 12
+    area, second_moment = stator.area, stator.second_moment
     E, rho = stator.youngs_modulus, stator.density
     flexural_rigidity, shear_rigidity = _bending_rigidities(stator)
     translational, rotary, flexural = bending(
@@ -232,5 +309,6 @@ def stator_foreshortening(stator: Stator) -> Matrix:
 def _bending_rigidities(stator: Stator) -> tuple[float, float]:
     """E I (N m^2) and kappa G A (N) of a stator."""
     E, nu = stator.youngs_modulus, stator.poissons_ratio
-    shear = shear_coefficient_rectangle(nu) * E / (2 * (1 + nu)) * (stator.width * stator.height)
-    return E * (stator.width * stator.height**3 / 12), shear
+    is_round = stator.diameter is not None
+    coefficient = shear_coefficient_circle(nu) if is_round else shear_coefficient_rectangle(nu)
+    return E * stator.second_moment, coefficient * E / (2 * (1 + nu)) * stator.area

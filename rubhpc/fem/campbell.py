@@ -73,15 +73,15 @@ def campbell(
 def follow_modes(body: Body, speeds: Sequence[float] | NDArray[np.float64]) -> list[tuple[Mode, ...]]:
     """Return every mode of a body as a tuple over the speeds (rad/s, in order)."""
     followed = [modes(body, float(speeds[0]))]
+    known = followed[0]  # of each track, the last state that is its own
     for speed in speeds[1:]:
-        followed.append(continued(body, followed[-1], float(speed)))
+        found = modes(body, float(speed))
+        followed.append([found[i] for i in matches(body, known, found)])
+        is_shared = np.any(_twins(followed[-1]), axis=1)
+        known = [
+            old if shared else new for old, new, shared in zip(known, followed[-1], is_shared, strict=True)
+        ]
     return list(zip(*followed, strict=True))
-
-
-def continued(body: Body, before: list[Mode], speed: float) -> list[Mode]:
-    """Return the modes at a speed (rad/s) in the order of their matches at a nearby speed, `before`."""
-    found = modes(body, speed)
-    return [found[i] for i in _order(body, before, found)]
 
 
 def critical_speeds(curves: xr.Dataset, order: float = 1.0) -> list[tuple[int, float]]:
@@ -110,8 +110,11 @@ def critical_speeds(curves: xr.Dataset, order: float = 1.0) -> list[tuple[int, f
     return sorted(crossings, key=lambda crossing: crossing[1])
 
 
-def _order(body: Body, before: list[Mode], after: list[Mode]) -> NDArray[np.intp]:
-    """Return the number in `after` of the match of each mode in `before`, (n_mode,)."""
+def matches(body: Body, before: Sequence[Mode], after: Sequence[Mode]) -> NDArray[np.intp]:
+    """Return the number in `after` of the match of each mode in `before`, (n_mode,), at a nearby speed.
+
+    The shapes of modes of one eigenvalue are arbitrary; their matches are in the order of their frequencies.
+    """
     likeness = np.abs(
         np.stack([mode.shape.conj() for mode in before])
         @ body.mass
@@ -121,4 +124,15 @@ def _order(body: Body, before: list[Mode], after: list[Mode]) -> NDArray[np.intp
     there = np.array([mode.eigenvalue for mode in after])
     change = np.abs(here - there) / np.maximum(np.abs(here) + np.abs(there), 1e-300)
     order: NDArray[np.intp] = linear_sum_assignment(change - likeness**2)[1]
+    for one, other in np.argwhere(np.triu(_twins(before))):
+        order[[one, other]] = np.sort(order[[one, other]])
     return order
+
+
+def _twins(found: Sequence[Mode]) -> NDArray[np.bool_]:
+    """Which modes have one eigenvalue and thus arbitrary shapes, (n_mode, n_mode)."""
+    values = np.array([mode.eigenvalue for mode in found])
+    planar = np.array([mode.whirl == "planar" for mode in found])
+    near = np.abs(values[:, np.newaxis] - values) <= 1e-9 * np.abs(values)
+    twins: NDArray[np.bool_] = near & planar & planar[:, np.newaxis] & ~np.eye(len(found), dtype=bool)
+    return twins

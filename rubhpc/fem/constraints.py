@@ -14,6 +14,7 @@ from rubhpc.fem.modes import KINDS
 if TYPE_CHECKING:
     from rubhpc.fem.model import Body, Model
 
+FLOATS = "the rotor floats freely: its bearings do not hold it"
 RIGID = 1e-12  # square of a frequency over the greatest, below which a mode is a rigid-body mode
 
 
@@ -22,8 +23,8 @@ def find_rigid_body_mode(model: Model) -> str:
     nodes = {model.output_node, *(stator.node for stator in model.stators)}
     seen = [model.rotor.index(node, name) for node in sorted(nodes) for name in ("v", "w", "thx")]
     if row := rigid_body_row(model.rotor, [row for row in seen if row >= 0]):
-        motion = "turn (torsion)" if model.rotor.degrees[row - 1][1] in KINDS["torsional"] else "move"
-        return f"the rotor is free to {motion}"
+        is_torsion = model.rotor.degrees[row - 1][1] in KINDS["torsional"]
+        return "the rotor is free to turn (torsion)" if is_torsion else FLOATS
     held = set()  # bodies, which the stators of a ring or a carrier share
     for i, stator in enumerate(model.stators, 1):
         rows = [row for row in (stator.axial, stator.lateral) if row >= 0]
@@ -34,6 +35,15 @@ def find_rigid_body_mode(model: Model) -> str:
             on = next((carrier.name for carrier in model.carriers if i in carrier.stators), "")
             return f"{f'carrier {on}' if on else f'stator {i}'} is free to move"
     return ""
+
+
+def unheld_message(free: str, at: str = "") -> str:
+    """Return why the modal scheme is refused for what `find_rigid_body_mode` describes."""
+    hold = {FLOATS: "add a bearing with a stiffness"}.get(free, "hold it")
+    if "torsion" in free:  # friction turns a free rotor back for ever: it has no steady twist
+        hold = "give it a stiffness, however soft"
+    problem = f"modal needs constrained bodies, and {free}{f' at {at}' if at else ''}"
+    return f'[integrator] method: {problem}; {hold}, or set method = "central-difference"'
 
 
 def rigid_body_row(body: Body, seen: list[int]) -> int:

@@ -4,23 +4,27 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import brentq
 
-from rubhpc.fem.campbell import continued, follow_modes
+from rubhpc.fem.campbell import follow_modes, matches
+from rubhpc.fem.modes import KINDS, modes
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
-    from rubhpc.fem.model import Model
+    from rubhpc.fem.model import Body, Model
     from rubhpc.fem.modes import Mode
 
 EXCITED = 1e-3  # share of the unbalance's work on a mode, below which it is taken for none
 _TOLERANCE = 1e-10  # of a speed
+_BARELY = 1e-5  # share of an eigenvalue that oscillates, at both ends of an interval: overdamped modes alike
+_PER_INTERVAL = 8  # of a bearing's table, in which crossings are sought
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -65,7 +69,8 @@ def find_critical_speeds(
     ----------
     model : Model
     speeds : (n_speed,)
-        Spin, rad/s, rising or falling: the grid on which modes are followed. A crossing is then solved for.
+        Spin, rad/s, rising or falling: the grid on which modes are followed, to number them. Crossings are
+        solved for and depend on its ends alone.
     tracks : sequence of tuple of Mode, optional
         What `follow_modes` returned for these speeds, if it is known.
 
@@ -78,33 +83,85 @@ def find_critical_speeds(
     body = model.rotor
     speeds = np.asarray(speeds, dtype=np.float64)
     tracks = follow_modes(body, speeds) if tracks is None else tracks
+    lateral = body.rows(KINDS["lateral"])  # torsion and axial motion may cross the line the other way
+    numbered = [(n, track) for n, track in enumerate(tracks, start=1) if track[0].shape[lateral].any()]
+    known = {
+        speed: list(found) for speed, *found in zip(speeds.tolist(), *(t for _, t in numbered), strict=True)
+    }
+
+    def modes_at(spin: float) -> list[Mode]:
+        if spin not in known:
+            known[spin] = [mode for mode in modes(body, spin) if mode.shape[lateral].any()]
+        return known[spin]
+
     found = []
-    for i_mode, track in enumerate(tracks):
-        if track[0].kind != "lateral":
-            continue
-        excess = np.abs(speeds) - np.array([abs(mode.eigenvalue) for mode in track])
-        oscillates = np.array([mode.eigenvalue.imag > 0.0 for mode in track])
-        crosses = (excess[:-1] < 0.0) != (excess[1:] < 0.0)
-        for i in np.flatnonzero(crosses & (oscillates[:-1] | oscillates[1:])):
-            before = [other[i] for other in tracks]
-
-            def beyond(spin: float, before: list[Mode] = before, i_mode: int = i_mode) -> float:
-                return abs(spin) - abs(continued(body, before, spin)[i_mode].eigenvalue)
-
-            ends = float(speeds[i]), float(speeds[i + 1])
-            speed = (
-                float(brentq(beyond, *ends, rtol=_TOLERANCE))
-                if beyond(ends[0]) * beyond(ends[1]) <= 0
-                else ends[1]
-            )
-            mode = continued(body, before, speed)[i_mode]
-            if mode.eigenvalue.imag > 0.0:
+    for speed, places in _crossings(_search_grid(body, speeds), modes_at):
+        listed = modes_at(speed)
+        # of the states on the grid, the nearest but for standstill, where modes may be degenerate
+        near = int(np.argmin(np.where(speeds == 0.0, np.inf, np.abs(speeds - speed))))
+        order = matches(body, [track[near] for _, track in numbered], listed)
+        number = {int(i): n for i, (n, _) in zip(order, numbered, strict=True)}
+        for i in np.unique(_sizes(listed)[1][places]).tolist():
+            if _may_be_critical(listed[i]):
+                excitation = _excitation(model, listed[i], speed)
                 found.append(
-                    CriticalSpeed(
-                        speed=speed, number=i_mode + 1, mode=mode, excitation=_excitation(model, mode, speed)
-                    )
+                    CriticalSpeed(speed=speed, number=number[i], mode=listed[i], excitation=excitation)
                 )
     return sorted(found, key=lambda critical: abs(critical.speed))
+
+
+def _search_grid(body: Body, speeds: NDArray[np.float64]) -> list[float]:
+    """The speeds given, and some in each interval of the bearings' tables, where a curve may turn back."""
+    low, high = float(speeds.min()), float(speeds.max())
+    inner = {
+        a + (b - a) * i / _PER_INTERVAL
+        for a, b in pairwise(body.tabulated_speeds)
+        for i in range(_PER_INTERVAL)
+    }
+    return sorted({*speeds.tolist(), *(speed for speed in inner if low < speed < high)})
+
+
+def _crossings(
+    grid: Sequence[float], modes_at: Callable[[float], list[Mode]]
+) -> Iterator[tuple[float, list[int]]]:
+    """Yield the spins that equal the size of an eigenvalue, and its places among all sizes, which rise.
+
+    The sizes in their order are continuous functions of the spin, whichever modes cross or are degenerate, so
+    that no mode has to be followed.
+    """
+
+    def excess(spin: float, place: int) -> float:
+        return abs(spin) - float(_sizes(modes_at(spin))[0][place])
+
+    roots = []
+    for one, other in pairwise(grid):
+        (before, owner), (after, later) = _sizes(modes_at(one)), _sizes(modes_at(other))
+        for place in np.flatnonzero((before > abs(one)) != (after > abs(other))).tolist():
+            ends = modes_at(one)[owner[place]], modes_at(other)[later[place]]
+            if any(_may_be_critical(mode, _BARELY) for mode in ends):
+                roots.append((float(brentq(excess, one, other, args=(place,), rtol=_TOLERANCE)), place))
+    roots.sort()
+    while roots:
+        speed = roots[0][0]
+        equal = [place for root, place in roots if root - speed <= 4 * _TOLERANCE * abs(speed)]
+        yield speed, equal
+        roots = roots[len(equal) :]
+
+
+def _sizes(found: Sequence[Mode]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Sizes of all eigenvalues, rising, rad/s, and the mode that each belongs to, (2 n_mode,) both."""
+    slow = np.array([abs(mode.eigenvalue) for mode in found])
+    product = np.array([(2 * math.pi * mode.frequency) ** 2 for mode in found])
+    oscillates = np.array([mode.eigenvalue.imag > 0.0 for mode in found])
+    fast = np.where(oscillates, slow, product / np.where(slow > 0.0, slow, np.inf))
+    sizes = np.concatenate([slow, fast])
+    order = np.argsort(sizes, kind="stable")
+    return sizes[order], order % len(found)
+
+
+def _may_be_critical(mode: Mode, least: float = 0.0) -> bool:
+    """Whether a mode is lateral and oscillates, by more than a share of its eigenvalue."""
+    return mode.kind == "lateral" and mode.eigenvalue.imag > least * abs(mode.eigenvalue)
 
 
 def _excitation(model: Model, mode: Mode, spin: float) -> float:

@@ -57,7 +57,7 @@ def forces_on(rotor: AnyRotor, body: Body) -> tuple[Floats, Floats, Floats]:
     for _, force in rotor.node_forces():
         parts = lateral_force(force)
         for i_direction, name in enumerate(("v", "w")):
-            row = body.index(force.node, name)
+            row = body.index(rotor.node_of(force), name)
             if row >= 0:
                 constant[row] += parts.constant[i_direction]
                 cosine[row] += parts.cosine[i_direction]

@@ -79,6 +79,9 @@ def linear_design(
 
         `threshold_speed` (rad/s): where the rotor begins to be unstable; NaN where it is stable.
 
+        Attributes: `rig`, its name; `speed_range` and, where given, `operating` (rad/s); `bearing_nodes`, the
+        nodes with bearings or seals.
+
     Raises
     ------
     InputError
@@ -109,7 +112,8 @@ def linear_design(
     )
     threshold = threshold_speed(model.rotor, speeds, tracks)
     design["threshold_speed"] = ((), threshold, _unit("rad s-1", "Threshold speed of instability"))
-    design.attrs = {"rig": rig.name, "speed_range": [low, high]}
+    bearings = sorted({rig.rotor.node_of(bearing) for bearing in rig.rotor.bearing})
+    design.attrs = {"rig": rig.name, "speed_range": [low, high], "bearing_nodes": bearings}
     if operating is not None:
         design.attrs["operating"] = list(operating)
     return design
@@ -157,8 +161,7 @@ def _positions(rig: Rig, model: Model) -> xr.Dataset:
     nodes = response_nodes(model)
     positions = np.full(len(nodes), np.nan)
     if isinstance(rig.rotor, Rotor):
-        lengths = [s.length / s.elements for s in rig.rotor.shaft for _ in range(s.elements)]
-        positions = np.concatenate([[0.0], np.cumsum(lengths)])[np.array(nodes) - 1]
+        positions = rig.rotor.positions[np.array(nodes) - 1]
     place = ("node", positions, _unit("m", "Position along the shaft"))
     return xr.Dataset(coords={"node": nodes, "position": place})
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import accumulate, pairwise
+from itertools import accumulate, pairwise, product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,7 +30,9 @@ class Support:
     """A bearing or seal with coefficients that depend on the spin."""
 
     table: BearingTable
+    node: int
     rows: tuple[int, int]  # of "v" and "w" of its node; -1 where there is none
+    far: tuple[int, int]  # of what it stands on; -1 on the ground
     name: str  # for messages
 
 
@@ -56,11 +58,20 @@ class SpeedDependence:
         stiffness, damping = self.stiffness.copy(), self.damping.copy()
         for support in self.supports:
             k, c = support.table.at(spin, support.name)
-            there = [i for i, row in enumerate(support.rows) if row >= 0]
-            rows = [support.rows[i] for i in there]
-            stiffness[np.ix_(rows, rows)] += k[np.ix_(there, there)]
-            damping[np.ix_(rows, rows)] += (c + self.proportional * k)[np.ix_(there, there)]
+            couple(stiffness, k, support.rows, support.far)
+            couple(damping, c + self.proportional * k, support.rows, support.far)
         return stiffness, damping
+
+
+def couple(
+    matrix: NDArray[np.float64], block: NDArray[np.float64], rows: Sequence[int], far: Sequence[int]
+) -> None:
+    """Add a block (2, 2) that acts on the motion of two rows relative to two others; -1: of the ground."""
+    for here, its_sign in ((rows, 1.0), (far, -1.0)):
+        for there, sign in ((rows, 1.0), (far, -1.0)):
+            for (i, row), (j, column) in product(enumerate(here), enumerate(there)):
+                if row >= 0 and column >= 0:
+                    matrix[row, column] += its_sign * sign * block[i, j]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -32,6 +32,7 @@ KINDS = {
     "torsional": ("thx",),
     "axial": ("u", "axial"),
 }
+_EXACT = 1e-10  # rounding of an eigenvalue, over its size, that is accepted
 OTHER = "other"  # kind of the degrees that only user-supplied matrices have
 
 
@@ -155,12 +156,13 @@ def _eigenpairs(
     square, basis = undamped_modes(mass, symmetric)
     sigma = np.where(square == 0.0, 1.0, np.sqrt(np.abs(square)))
     stiff = np.diag(square) + basis.T @ (stiffness - symmetric) @ basis
-    state = np.block(
-        [[np.zeros((n_mode, n_mode)), np.diag(sigma)], [-stiff / sigma, -basis.T @ damping @ basis]]
-    )
+    damp = basis.T @ damping @ basis
+    state = np.block([[np.zeros((n_mode, n_mode)), np.diag(sigma)], [-stiff / sigma, -damp]])
     if not np.isfinite(state).all():
         raise InputError(f"modes: {FAR_APART}")
     values, vectors = eig(state)
+    if EPS * np.abs(values).max(initial=0.0) > _EXACT * np.abs(values).min(initial=np.inf):
+        values, vectors = _refined(state, stiff, damp, sigma)
     shapes = basis @ (vectors[:n_mode] / sigma[:, np.newaxis])
     # at critical damping rounding splits a double root by the square root of EPS
     oscillates = values.imag > 1e-7 * np.abs(values)
@@ -170,6 +172,31 @@ def _eigenpairs(
     real = np.abs(values.imag) <= 1e-7 * np.abs(values)
     pairs.extend(_real_pairs(values[real].real, shapes[:, real].real, mass, damping))
     return pairs
+
+
+def _refined(
+    state: NDArray[np.float64],
+    stiffness: NDArray[np.float64],
+    damping: NDArray[np.float64],
+    sigma: NDArray[np.float64],
+) -> tuple[Vector, NDArray[np.complex128]]:
+    """Eigenvalues (rad/s) of a state matrix, and vectors.
+
+    Lightly damped ones are free of the rounding of the highest: roots of `y^H (s^2 + s C + K) x = 0` with the
+    left and right shapes y and x, whose error is that of both shapes multiplied.
+    """
+    values, left, vectors = eig(state, left=True)
+    x, y = vectors[: len(sigma)] / sigma[:, np.newaxis], left[len(sigma) :].conj()
+    a, b, c = (np.sum(y * part, axis=0) for part in (x, damping @ x, stiffness @ x))
+    with np.errstate(divide="ignore", invalid="ignore"):  # where left and right shapes are of two twins
+        middle, reach = -b / (2 * a), np.sqrt((b / (2 * a)) ** 2 - c / a)
+        roots = np.stack([middle + reach, middle - reach])
+    change = np.abs(roots - values)
+    nearest = np.take_along_axis(roots, np.argmin(change, axis=0)[np.newaxis], axis=0)[0]
+    is_better = change.min(axis=0) <= 100 * EPS * np.abs(values).max()
+    for light in (values, nearest):
+        is_better &= np.abs(light.real) < light.imag
+    return np.where(is_better, nearest, values), vectors
 
 
 def _real_pairs(

@@ -66,15 +66,12 @@ def probes_at(model: Model, spin: float, before: float) -> Model:
             continue
         direction = np.array([math.cos(probe.angle), math.sin(probe.angle)])
         for support in by_speed.supports:
-            if support.table.node == probe.node:
+            if support.node == probe.node:
                 now, then = (support.table.at(speed, support.name) for speed in (spin, before))
                 stiffness, damping = now[0] - then[0], now[1] - then[1]
-                for k, row in enumerate(support.rows):
-                    if row >= 0:
-                        rows[DISPLACEMENT, i, row] += (direction @ stiffness)[k]
-                        rows[VELOCITY, i, row] += (direction @ (damping + by_speed.proportional * stiffness))[
-                            k
-                        ]
+                at = (support.rows, support.far)
+                _add_force(rows[DISPLACEMENT, i], direction @ stiffness, *at)
+                _add_force(rows[VELOCITY, i], direction @ (damping + by_speed.proportional * stiffness), *at)
     constant = rows[DISPLACEMENT][:, : model.rotor.n_dof] @ model.sag
     return replace(model, probe=replace(model.probe, rows=rows, constant=constant))
 
@@ -129,23 +126,39 @@ def _number(probe: Probe, model: Model) -> int:
 
 
 def _fill_bearing_force(rows: Floats, probe: Probe, model: Model, rig: Rig, spin: float) -> None:
-    """Force of the shaft on the bearings of a node, `e . (K u + (C + beta K) u')`, beta being Rayleigh's."""
-    at = [_at_node(probe, model, rig, name) for name in ("v", "w")]
-    supports = [(i, b) for i, b in enumerate(rig.rotor.bearing, 1) if b.node == probe.node]
-    if not supports:
-        nodes = ", ".join(str(n) for n in sorted({b.node for b in rig.rotor.bearing})) or "none"
-        raise InputError(f"node: {probe.node} has no bearing; nodes with one: {nodes}")
-    beta = rayleigh_coefficients(rig.rotor.damping)[1] if isinstance(rig.rotor, Rotor) else 0.0
+    """Force of the shaft on the bearings of a node, `e . (M u'' + (C + alpha M + beta K) u' + K u)`.
+
+    M is the mass of the bearings, alpha and beta are Rayleigh's, and u is the motion of the shaft relative to
+    what they stand on.
+    """
+    near = [_at_node(probe, model, rig, name) for name in ("v", "w")]
+    rotor = rig.rotor
+    nodes = [rotor.node_of(bearing) for bearing in rotor.bearing]
+    if probe.node not in nodes:
+        listed = ", ".join(str(n) for n in sorted(set(nodes))) or "none"
+        raise InputError(f"node: {probe.node} has no bearing; nodes with one: {listed}")
+    alpha, beta = rayleigh_coefficients(rotor.damping) if isinstance(rotor, Rotor) else (0.0, 0.0)
     direction = np.array([math.cos(probe.angle), math.sin(probe.angle)])
-    for number, support in supports:
+    for number, (node, support) in enumerate(zip(nodes, rotor.bearing, strict=True), 1):
+        if node != probe.node:
+            continue
         if isinstance(support, BearingTable):
             stiffness, damping = support.at(spin, f"rotor.bearing.{number}")
         else:
             stiffness, damping = np.array(support.stiffness_matrix), np.array(support.damping_matrix)
-        for k, row in enumerate(at):
-            if row >= 0:
-                rows[DISPLACEMENT, row] += (direction @ stiffness)[k]
-                rows[VELOCITY, row] += (direction @ (damping + beta * stiffness))[k]
+        mass = np.array(support.mass_matrix)
+        far = [model.rotor.index(rotor.stands_on(number) or 0, name) for name in ("v", "w")]
+        _add_force(rows[DISPLACEMENT], direction @ stiffness, near, far)
+        _add_force(rows[VELOCITY], direction @ (damping + alpha * mass + beta * stiffness), near, far)
+        _add_force(rows[ACCELERATION], direction @ mass, near, far)
+
+
+def _add_force(row: Floats, factors: Floats, near: Sequence[int], far: Sequence[int]) -> None:
+    """Add a force by the motion of two rows relative to two others to what a probe sees, (n_all,)."""
+    for places, sign in ((near, 1.0), (far, -1.0)):
+        for place, factor in zip(places, factors, strict=True):
+            if place >= 0:
+                row[place] += sign * factor
 
 
 def _fill_foundation_force(rows: Floats, probe: Probe, model: Model, rig: Rig) -> None:

@@ -129,7 +129,8 @@ def step_limit(model: Model) -> float:
     """
     rotors = [model.rotor, *(model.rotor.at(speed) for speed in model.rotor.tabulated_speeds)]
     bodies = [*rotors, *(body for body in model.bodies[1:] if body.n_dof)]
-    return 2.0 / math.sqrt(max(_spectral_radius(body) for body in bodies))
+    fastest = math.sqrt(max(_spectral_radius(body) for body in bodies))
+    return 2.0 / fastest if fastest else math.inf
 
 
 def _spectral_radius(body: Body) -> float:

@@ -1,4 +1,4 @@
-"""Assembly of a rotor: shaft sections, discs, bearings, torsional drive and damping, or its matrices."""
+"""Assembly of a rotor from its parts (shaft sections, sleeves, discs, supports, drive) or its matrices."""
 
 from __future__ import annotations
 
@@ -8,16 +8,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.fem.beam import ROTOR_DEGREES, join, rotor_element
+from rubhpc.fem.beam import ROTOR_DEGREES, join, rotor_elements
 from rubhpc.fem.damping import rayleigh_coefficients
-from rubhpc.fem.model import Body, SpeedDependence, Support
+from rubhpc.fem.model import Body, SpeedDependence, Support, couple
 from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.rig.rotors import MatrixRotor, Rotor
+from rubhpc.rig.supports import Springs
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rubhpc.rig.bearing_table import AnyBearing
+    from rubhpc.rig.rotors import AnyRotor
+
+GROUND = (-1, -1)
 
 
 @singledispatch
@@ -39,26 +42,43 @@ def _(rotor: Rotor) -> Body:
     A disc tilted by (thy, thz) carries its polar momentum along `(1, thz, -thy)`, hence
     `Id thy'' + spin Ip thz' = My` and `Id thz'' - spin Ip thy' = Mz`.
     """
-    sections = [[rotor_element(section)] * section.elements for section in rotor.shaft]
+    lengths = [[section.length / section.elements] * section.elements for section in rotor.shaft]
+    sections = [rotor_elements(*given) for given in zip(rotor.shaft, lengths, strict=True)]
     shaft = join([element for equal in sections for element in equal])
-    M, G, K = shaft.mass, shaft.gyroscopic, shaft.stiffness
-    dampers = np.zeros_like(M)
-    n_node = len(M) // 6
+    n_shaft = len(shaft.mass)
+    stands = [node for stand in rotor.stands.values() for node, _ in stand]
+    n_all = n_shaft + 2 * len(stands)
+    M, G, K, dampers = np.zeros((4, n_all, n_all))
+    for matrix, own in ((M, shaft.mass), (G, shaft.gyroscopic), (K, shaft.stiffness)):
+        matrix[:n_shaft, :n_shaft] = own
+    degrees = [(node, name) for node in range(1, rotor.n_node + 1) for name in ROTOR_DEGREES]
+    degrees += [(node, name) for node in stands for name in ("v", "w")]
 
+    every = [length for equal in lengths for length in equal]
+    for sleeve in rotor.sleeve:
+        first, last = rotor.sleeve_nodes(sleeve)
+        part = join(rotor_elements(sleeve, every[first - 1 : last - 1]))
+        covered = slice(6 * (first - 1), 6 * last)
+        for matrix, added in ((M, part.mass), (G, part.gyroscopic), (K, part.stiffness)):
+            matrix[covered, covered] += added
     for disc in rotor.disc:
-        u, v, w, thx, thy, thz = range(6 * (disc.node - 1), 6 * disc.node)
+        node = rotor.node_of(disc)
+        u, v, w, thx, thy, thz = range(6 * (node - 1), 6 * node)
         mass, diametral, polar = disc.inertia
         diagonal = [u, v, w, thx, thy, thz]
         M[diagonal, diagonal] += [mass, mass, mass, polar, diametral, diametral]
         G[thy, thz] += polar
         G[thz, thy] -= polar
-    for bearing in rotor.bearing:
-        if isinstance(bearing, BearingTable):
-            continue
-        first = 6 * (bearing.node - 1) + 1
-        seat = slice(first, first + 2)
-        K[seat, seat] += bearing.stiffness_matrix
-        dampers[seat, seat] += bearing.damping_matrix
+    for number, bearing in enumerate(rotor.bearing, 1):
+        supports = [bearing, *(pedestal for _, pedestal in rotor.stands[number])]
+        nodes = [rotor.node_of(bearing), *(node for node, _ in rotor.stands[number])]
+        places = [*(_rows(degrees, node) for node in nodes), GROUND]
+        for support, near, far in zip(supports, places, places[1:], strict=False):
+            # the mass of a pedestal is its own, that of a bearing acts on relative motion
+            couple(M, np.array(support.mass_matrix), near, far if support is bearing else GROUND)
+            if isinstance(support, Springs):
+                couple(K, np.array(support.stiffness_matrix), near, far)
+                couple(dampers, np.array(support.damping_matrix), near, far)
     drive = rotor.torsion
     if drive.fixed_node is None:
         thx = 6 * (drive.node - 1) + 3
@@ -67,7 +87,6 @@ def _(rotor: Rotor) -> Body:
 
     alpha, beta = rayleigh_coefficients(rotor.damping)
     constrained = {(1, "u"), (drive.fixed_node, "thx")}
-    degrees = [(node, name) for node in range(1, n_node + 1) for name in ROTOR_DEGREES]
     free = [row for row, degree in enumerate(degrees) if degree not in constrained]
     rows = np.ix_(free, free)
     body = Body(
@@ -77,7 +96,7 @@ def _(rotor: Rotor) -> Body:
         stiffness=K[rows],
         degrees=tuple(degrees[row] for row in free),
     )
-    return _with_tables(body, rotor.bearing, beta)
+    return _with_tables(body, rotor, beta)
 
 
 @assemble_rotor.register(MatrixRotor)
@@ -91,27 +110,35 @@ def _(rotor: MatrixRotor) -> Body:
         stiffness=rotor.stiffness,
         degrees=rotor.degrees,
     )
-    return _with_tables(body, rotor.bearing)
+    return _with_tables(body, rotor)
 
 
-def _with_tables(body: Body, bearings: Sequence[AnyBearing], proportional: float = 0.0) -> Body:
-    """Return a body with its speed-dependent bearings, at standstill.
+def _rows(degrees: Sequence[tuple[int, str]], node: int | None) -> tuple[int, int]:
+    """Rows of "v" and "w" of a node; -1 where there is none."""
+    v, w = ((node, name) for name in ("v", "w"))
+    return (degrees.index(v) if v in degrees else -1, degrees.index(w) if w in degrees else -1)
+
+
+def _with_tables(body: Body, rotor: AnyRotor, proportional: float = 0.0) -> Body:
+    """Return a body with the speed-dependent bearings of its rotor, at standstill.
 
     Parameters
     ----------
     body : Body
         Without its speed-dependent bearings.
-    bearings : sequence of Bearing or BearingTable
+    rotor : Rotor or MatrixRotor
     proportional : float
         Rayleigh's beta, s, which includes their stiffness.
     """
     supports = tuple(
         Support(
             table=bearing,
-            rows=(body.index(bearing.node, "v"), body.index(bearing.node, "w")),
+            node=rotor.node_of(bearing),
+            rows=_rows(body.degrees, rotor.node_of(bearing)),
+            far=_rows(body.degrees, rotor.stands_on(number)),
             name=f"rotor.bearing.{number}",
         )
-        for number, bearing in enumerate(bearings, 1)
+        for number, bearing in enumerate(rotor.bearing, 1)
         if isinstance(bearing, BearingTable)
     )
     if not supports:

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 HALF_POWER = math.sqrt(0.5)
 CRITICALLY_DAMPED = 2.5  # amplification factor below which no margin is asked for
 _ACROSS = np.array([-8.0, -4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0, 8.0])  # half widths of a resonance
+_NARROWEST = 1e-8  # half width of a resonance without damping, whose response is unbounded, over its speed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,9 +116,19 @@ def amplitude_over_speed(model: Model, node: int, probe: float | None = None) ->
 def grid_through(
     low: float, high: float, critical: Sequence[CriticalSpeed] = (), n_speed: int = 301
 ) -> NDArray[np.float64]:
-    """Return speeds from low to high, rad/s, some within the half width of each critical speed."""
-    extra = [abs(c.speed) * (1.0 + _ACROSS * max(abs(c.mode.damping_ratio), 1e-8)) for c in critical]
-    grid = np.concatenate([np.linspace(low, high, n_speed), *extra])
+    """Return speeds from low to high, rad/s, some within the half width of each critical speed.
+
+    None is at a critical speed without damping, where the response is unbounded, nor near one that the
+    unbalance does not excite, where it is rounding.
+    """
+    grid = np.linspace(low, high, n_speed)
+    for c in critical:
+        speed, width = abs(c.speed), abs(c.speed) * max(abs(c.mode.damping_ratio), _NARROWEST)
+        is_damped = abs(c.mode.damping_ratio) >= _NARROWEST
+        if is_damped or c.is_excited:
+            grid = np.append(grid, speed + _ACROSS * width)
+        if not is_damped:
+            grid = grid[np.abs(grid - speed) > 0.25 * width]
     return np.unique(grid[(grid >= low) & (grid <= high)])
 
 
@@ -143,12 +154,13 @@ def _peak(
     amplitude: Callable[[float], float], grid: NDArray[np.float64], values: NDArray[np.float64], i: int
 ) -> ResponsePeak:
     ends = float(grid[i - 1]), float(grid[i + 1])
-    best = minimize_scalar(
-        lambda spin: -amplitude(spin), bounds=ends, method="bounded", options={"xatol": 1e-9 * ends[1]}
-    )
-    speed, height = float(best.x), -float(best.fun)
-    if height < values[i]:  # a resonance narrower than the tolerance
-        speed, height = float(grid[i]), float(values[i])
+    speed, height = float(grid[i]), float(values[i])
+    if ends[1] - ends[0] > 4 * _NARROWEST * ends[1]:
+        best = minimize_scalar(
+            lambda spin: -amplitude(spin), bounds=ends, method="bounded", options={"xatol": 1e-9 * ends[1]}
+        )
+        if -best.fun >= height:
+            speed, height = float(best.x), -float(best.fun)
 
     def crossing(step: int) -> float:
         inside = speed

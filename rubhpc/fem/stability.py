@@ -18,9 +18,8 @@ if TYPE_CHECKING:
     from rubhpc.fem.model import Body, Model
     from rubhpc.fem.modes import Mode
 
-# Growth, as a share of the mode's own eigenvalue and of the greatest one, that is rounding.
-_ROUNDING = 1e-8
-_ROUNDING_OF_GREATEST = 1e-12
+_ROUNDING = 1e-8  # growth, as a share of the mode's own eigenvalue, that is rounding
+_ROUNDING_OF_GREATEST = 1e-12  # size of an eigenvalue, as a share of the greatest, that is a rigid body's 0
 _RESOLUTION = 1e-6  # of a threshold speed
 _SYMMETRY = 1e-12  # of a matrix, that is rounding
 
@@ -62,7 +61,8 @@ def is_passive(body: Body) -> bool:
 
 def is_rounding(mode: Mode, greatest: float) -> bool:
     """Whether growth or decay of a mode is rounding; `greatest` is the largest eigenvalue's size, rad/s."""
-    return abs(mode.eigenvalue.real) <= _ROUNDING_OF_GREATEST * greatest + _ROUNDING * abs(mode.eigenvalue)
+    size = abs(mode.eigenvalue)
+    return abs(mode.eigenvalue.real) <= _ROUNDING * size or size <= _ROUNDING_OF_GREATEST * greatest
 
 
 def growing_modes(found: Sequence[Mode]) -> list[Mode]:

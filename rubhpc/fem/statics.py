@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.errors import InputError
-from rubhpc.fem.constraints import rigid_body_row
+from rubhpc.fem.constraints import FLOATS, rigid_body_row
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -30,7 +30,7 @@ def sag_under(body: Body, load: Floats) -> Floats:
     if not loaded.size:
         return sag
     if rigid_body_row(body, loaded.tolist()):
-        problem = "gravity or a load acts on the rotor, which is unconstrained there"
+        problem = f"gravity or a load acts on it, and {FLOATS}"
         raise InputError(f"[rotor] {problem}; add a bearing with a stiffness, or remove gravity and loads")
     rows = np.flatnonzero(np.isin(body.part, body.part[loaded]))
     sag[rows] = np.linalg.solve(body.stiffness[np.ix_(rows, rows)], load[rows])

@@ -33,7 +33,7 @@ def find_key(owner: object, dotted: str) -> dataclasses.Field[Any]:
             current, declared = (current[int(part) - 1] if 0 < int(part) <= len(current) else None), None
             continue
         if isinstance(current, tuple) and current:  # a key of all items: each must have it
-            current = min(current, key=lambda item: part in _fields(type(item)))
+            current = min(current, key=lambda item: _has(item, part))
         declared = _fields(type(current)).get(part)
         current = getattr(current, part) if declared else None
     if declared is not None and _is_settable(declared):
@@ -116,6 +116,12 @@ def _keys(owner: Any, prefix: str = "") -> Iterator[str]:
 
 def _is_settable(declared: dataclasses.Field[Any]) -> bool:
     return declared.metadata.get("kind") in _SETTABLE and declared.metadata.get("is_key", True)
+
+
+def _has(item: Any, part: str) -> bool:
+    """Whether an item has a key, or a table that may be left out."""
+    declared = _fields(type(item)).get(part)
+    return declared is not None and ("kind" in declared.metadata or getattr(item, part) is not None)
 
 
 def _fields(cls: Any) -> dict[str, dataclasses.Field[Any]]:

@@ -22,6 +22,10 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
+_QUOTED = re.compile(r'"(?:[^"\\\n]|\\.)*+"?|\'[^\'\n]*+\'?|#[^\n]*+')  # texts, quoted keys, comments
+_DEEPEST = 32  # parts of a key: the parser takes memory as their square
+_DEEP = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{_DEEPEST}}}")
+
 
 def read_toml(path: Path, where: str = "") -> dict[str, Any]:
     """Return the tables of a TOML file.
@@ -148,7 +152,8 @@ def _kind_of(hint: Any, table: object) -> Any:
         required = {key_of(f) for f in declared if f.default is dataclasses.MISSING}
         return len(keys & {key_of(f) for f in declared}), -len(required - keys)
 
-    return max(get_args(hint) or (hint,), key=likeness)
+    kinds = [kind for kind in get_args(hint) or (hint,) if kind is not type(None)]  # None: it may be left out
+    return max(kinds, key=likeness)
 
 
 def _missing(declared: dataclasses.Field[Any], hint: Any, name: str) -> str:
@@ -164,6 +169,10 @@ def _parse_toml(content: bytes, file: str) -> dict[str, Any]:
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         raise InputError(f"{file}: line {line}: not UTF-8 text; save the file as UTF-8") from None
+    bare = _QUOTED.sub("q", text)
+    if deep := _DEEP.search(bare):
+        line = bare.count("\n", 0, deep.start()) + 1
+        raise InputError(f"{file}: line {line}: a key of over {_DEEPEST} parts; no key has so many")
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 
 import numba
 
+from rubhpc.children import command, environment
 from rubhpc.integrate.marches.closed_form import closed_form_march
 from rubhpc.integrate.marches.friction import FrictionMarch
 from rubhpc.integrate.measuring.samples import new_accumulator
@@ -34,7 +35,6 @@ from rubhpc.kernels.laws import FRICTION_LAWS, is_penalty
 from rubhpc.kernels.shooting import search_period
 from rubhpc.rig.reading import read_rig
 from rubhpc.study.study import Contact, Integrator
-from rubhpc.threads import VARIABLES
 
 if TYPE_CHECKING:
     from rubhpc.integrate.setup import Setup
@@ -68,20 +68,12 @@ def _start(friction_law: str, *, is_soft: bool) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        folder = str(Path(__file__).parents[2])
-        known = os.environ.get("PYTHONPATH")
-        environment = {
-            **os.environ,
-            **dict.fromkeys(VARIABLES, "1"),
-            "PYTHONPATH": folder if known is None else f"{folder}{os.pathsep}{known}",
-            "NUMBA_CACHE_DIR": numba.config.CACHE_DIR,  # type: ignore[attr-defined]
-        }
         started = subprocess.Popen(
-            [sys.executable, "-P", "-m", __name__, friction_law, *(["soft"] if is_soft else [])],
+            command(__name__, friction_law, *(["soft"] if is_soft else [])),
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
-            env=environment,
+            env=environment(NUMBA_CACHE_DIR=numba.config.CACHE_DIR),  # type: ignore[attr-defined]
             pass_fds=[lock.fileno()],
         )
     atexit.register(_end, started)

@@ -12,7 +12,16 @@ import numpy as np
 
 from rubhpc.integrate.ahead import compile_ahead
 from rubhpc.integrate.closed_form_case import exponents_of, give_back, judge_of, trail_of
-from rubhpc.integrate.compilation import seconds_compiling
+from rubhpc.integrate.compilation import (
+    COMMON,
+    CURVED,
+    NEIGHBOURS,
+    PERIODIC,
+    RUN_UPS,
+    STEPS,
+    STICK,
+    seconds_compiling,
+)
 from rubhpc.integrate.initial_state import fit_to_gaps, with_overlap
 from rubhpc.integrate.marched_record import Marched, march_record
 from rubhpc.integrate.marches.central_difference import CentralDifferenceMarch
@@ -40,6 +49,8 @@ from rubhpc.integrate.repeated_record import KnownMotion, repeat_period
 from rubhpc.integrate.scheme import Scheme
 from rubhpc.integrate.start import start_of
 from rubhpc.integrate.transient import pass_revolutions, pass_transient
+from rubhpc.kernels._jit import plain
+from rubhpc.kernels.laws import is_set_valued
 from rubhpc.schema import DONE, SECTION_NAMES
 from rubhpc.spectra import amplitude_spectrum
 from rubhpc.study.initial import Initial
@@ -82,6 +93,7 @@ def run_case(
     recording: Recording,
     initial: State | Initial | None = None,
     check: Callable[[], None] | None = None,
+    say: Callable[[str], None] = lambda _: None,
 ) -> Record:
     """Integrate one case and measure it.
 
@@ -96,6 +108,8 @@ def run_case(
         final state of another case is fitted to the gaps of this one (`initial_state.fit_to_gaps`).
     check : callable, optional
         Called between kernel calls, a quarter of a second apart at most; what it raises ends the case.
+    say : callable
+        Called with the progress of the case as often as `check`, if that is given.
     """
     began = time.perf_counter() - seconds_compiling()
     compile_ahead(setup)
@@ -105,7 +119,18 @@ def run_case(
         state = start_of(initial or Initial(), setup, clearance)
 
     def starter(scheme: Scheme) -> Callable[[State], March]:
-        return lambda state: march_of(scheme, setup)(setup, clearance, friction, state, check)
+        def start(state: State) -> March:
+            def look() -> None:
+                assert check is not None
+                check()
+                say(reached(march.sample / setup.samples_per_revolution))
+
+            march = march_of(scheme, setup)(
+                setup, clearance, friction, state, None if check is None else look
+            )
+            return march
+
+        return start
 
     scheme = setup.scheme
     try:
@@ -119,10 +144,29 @@ def run_case(
     record.measures["modal_error"] = setup.modal_error if isinstance(setup, ModalSetup) else math.nan
     if isinstance(setup, ModalSetup) and np.any(record.measures["contact_fraction"] != 0.0):
         record = replace(record, advice=setup.modes_missing)  # without contact no mode is excited
-    if record.final.overlap is None and not (scheme is Scheme.EVENT_DRIVEN and setup.law.stiffness == 0.0):
+    if scheme is not Scheme.EVENT_DRIVEN or setup.law.stiffness > 0.0:
         record = replace(record, final=with_overlap(record.final, setup, clearance))
     record.measures["wall_time"] = time.perf_counter() - seconds_compiling() - began
     return record
+
+
+def reached(revolution: float) -> str:
+    """Where a case is, whose record begins at revolution 0."""
+    if revolution < 0.0:
+        return f"a case at revolution {revolution:.0f}, its record begins at 0"
+    return f"a case at revolution {revolution:.0f} of its record"
+
+
+def kernel_sets(setup: Setup, *, changes_speed: bool = False) -> set[str]:
+    """Return the sets of kernels that a case of this set-up may need (`compilation`)."""
+    if not isinstance(setup, ModalSetup):
+        return {COMMON}
+    sets = {COMMON, RUN_UPS} if changes_speed else {COMMON, NEIGHBOURS}
+    if setup.scheme is Scheme.CONTACT_STEPPING:
+        return sets | {STEPS}
+    if setup.scheme is Scheme.CURVED:
+        return sets | {CURVED}
+    return sets | {PERIODIC} | ({STICK} if plain(is_set_valued)(setup.law) else set())
 
 
 def compile_kernels(

@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING, cast
 
 from rubhpc.integrate.lyapunov import Growth, Marches
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
+from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.measuring.orbit_measures import period
-from rubhpc.integrate.measuring.regimes import LEAST_REVOLUTIONS, regime
+from rubhpc.integrate.measuring.regimes import LASTING, LEAST_REVOLUTIONS, by_growth, regime
+from rubhpc.integrate.measuring.settling import is_steady
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.periodic_motions.lyapunov_spectrum import spectrum_of
 from rubhpc.integrate.periodic_motions.proof import Solver
 from rubhpc.integrate.tangent_motion import TangentMotion
-from rubhpc.schema import lyapunov_variables
+from rubhpc.kernels.trail import BROKEN
+from rubhpc.schema import REGIME, lyapunov_variables
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -62,6 +65,21 @@ def judge_of(
     solver = solver_of(march, setup, clearance, friction, final)
     growth = Growth(lambda: neighbours_of(march, trail, start, final, setup, recording))
 
+    def lasts(exponent: float) -> bool:
+        """Whether chaos was followed to the end of what is followed, does not drift and is chaos there."""
+        if solver is None or solver.followed is None:
+            return False
+        energy, end = solver.followed
+        if not is_steady(energy):
+            return False
+        if trail is not None:
+            trail.n_event[0] = BROKEN  # its room alone is used again
+        try:
+            flag, later = by_growth(Growth(lambda: neighbours_of(march, trail, start, end, setup, recording)))
+        except NoClosedForm:
+            return False
+        return flag == REGIME.index("chaotic") and exponent + later >= 2.0 * LASTING
+
     def judge(vertical: Floats, horizontal: Floats, per_revolution: int, is_contact: bool) -> Verdict:
         return regime(
             vertical,
@@ -73,6 +91,7 @@ def judge_of(
             within=growth.within,
             solve=solver,
             later=solver.later if solver is not None else None,
+            lasts=lasts if solver is not None else None,
             n_event=trail.n_event[0] / recording.revolutions if trail is not None else 0.0,
         )
 

@@ -9,29 +9,41 @@ from typing import TYPE_CHECKING, Any
 
 from numba.core import event
 
+from rubhpc.kernels._cache import temporary_folder
 from rubhpc.kernels._jit import compilation
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-_LONG = _STICK, _CURVED = "for friction with stick", "for curved gaps"  # parts that take more than a minute
-# Kernels with their own announcement -> purpose; they are compiled when a case first needs them.
-_PARTS = {
-    "advance_friction": _STICK,
-    "advance_by_steps": "for contact in short steps",
-    "advance_curved": _CURVED,
-    "follow_revolutions": "for periodic motions",
-    "search_period": "for periodic motions",
-    "fill_theory": "for periodic motions",
-    "advance_pieces": "for run-ups",
-    "carry_along": "for neighbouring motions, which distinguish chaos from order",
+COMMON = ""
+STICK, CURVED = "for friction with stick", "for curved gaps"
+STEPS, PERIODIC = "for contact in short steps", "for periodic motions"
+RUN_UPS = "for run-ups"
+NEIGHBOURS = "for neighbouring motions, which distinguish chaos from order"
+# Sets of kernels, each announced, and compiled when a case first needs it -> seconds that it takes, about.
+_SECONDS = {COMMON: 10, STICK: 70, CURVED: 70, STEPS: 10, PERIODIC: 10, RUN_UPS: 10, NEIGHBOURS: 10}
+_SETS = {  # kernel -> its set; all others are common
+    "advance_friction": STICK,
+    "advance_by_steps": STEPS,
+    "advance_curved": CURVED,
+    "follow_revolutions": PERIODIC,
+    "search_period": PERIODIC,
+    "fill_theory": PERIODIC,
+    "advance_pieces": RUN_UPS,
+    "carry_along": NEIGHBOURS,
 }
-_announced: set[str] = set()
+_announced: list[str] = []
+_expected: set[str] = set()  # sets of the study that is run
 
 
 def seconds_compiling() -> float:
     """Seconds that this process has spent on compilations so far."""
     return compilation.seconds
+
+
+def expect_sets(names: set[str]) -> None:
+    """Take the sets of kernels that a run may need, for announcements that count them."""
+    _expected.update(names)
 
 
 def to_stderr(text: str) -> None:
@@ -40,14 +52,22 @@ def to_stderr(text: str) -> None:
 
 
 def announce_by(announce: Callable[[str], None]) -> None:
-    """Call `announce` before kernels that are in no cache are compiled, once for each part of the program."""
+    """Call `announce` before kernels that are in no cache are compiled, once for each set of them."""
 
     def begin(name: str) -> None:
-        part = _PARTS.get(name, "")
-        if part not in _announced:
-            _announced.add(part)
-            lasts = "one to three minutes" if part in _LONG else "up to a minute"
-            announce(f"compiling kernels{part and ' '}{part}, once after an installation: {lasts}")
+        place = temporary_folder()
+        if place is not None and not _announced:
+            announce(f"compiled kernels are kept in {place}; set NUMBA_CACHE_DIR to a folder that lasts")
+        kernels = _SETS.get(name, COMMON)
+        if kernels not in _announced:
+            _announced.append(kernels)
+            n = len(_expected.intersection(_announced))
+            number = f"set {n} of at most {len(_expected)}, " if kernels in _expected else ""
+            purpose = f" {kernels}" if kernels else ""
+            announce(
+                f"compiling kernels{purpose}, once after an installation: "
+                f"{number}about {_SECONDS[kernels]} s on a free core"
+            )
 
     compilation.began = begin
 

@@ -1,7 +1,7 @@
 """Initial states: rest in the sag, or a motion of another case adapted to the gaps of this one.
 
 Overlaps are removed quasi-statically: rotor and stators move by their static shapes under the contact forces
-that close the gaps, with the least strain energy. If the first step closed the gaps instead, it would throw
+that close the gaps, circulation included. If the first step closed the gaps instead, it would throw
 the bodies apart at micrometres per microsecond.
 """
 
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.errors import InputError
-from rubhpc.fem.constraints import find_rigid_body_mode
+from rubhpc.fem.constraints import rigid_body_row
 from rubhpc.fem.model import state_size
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.packing import degrees_of
@@ -25,12 +25,14 @@ from rubhpc.kernels.lemke import solve_lemke
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from rubhpc.fem.model import Model
     from rubhpc.integrate.setup import Setup
 
     Floats = NDArray[np.float64]
 
 TOLERANCE = 1e-12  # m, a hundred times the tolerance of the integrators: a continued run is not changed
 PARTED = 1e-9  # m, beyond which a closed contact has opened
+TURNED = 1e-10  # of the forces, by which they may have turned with their normals in the last pass
 LEAST_FORCE = np.finfo(float).tiny  # N, least force that marks a contact as closed
 MOST_PASSES = 20  # for the curved gap of the updated normal; three or four are usual
 
@@ -55,35 +57,62 @@ def fit_to_gaps(state: State, setup: Setup, clearance: float) -> State:
             f"initial: a state of {state.packed().size} numbers for a rig of {state_size(setup.model)}; "
             "use it only for cases with the same degrees of freedom"
         )
+    return _fitted(state, setup, clearance)[0]
+
+
+def _fitted(state: State, setup: Setup, clearance: float, softness: float = 0.0) -> tuple[State, bool]:
+    """The state of `fit_to_gaps`, whose gaps give by `softness`, m/N, and whether its forces are found."""
     allowed = np.zeros_like(state.contact_force) if state.overlap is None else state.overlap
-    displacement = _as_seen(state.displacement, setup)
+    begin = displacement = _as_seen(state.displacement, setup)
     gap, gap_jacobian = gaps(displacement, setup, clearance)
-    force = np.zeros_like(gap)
-    if np.any(gap + allowed < -TOLERANCE):
+    force, is_found = np.zeros_like(gap), not np.any(gap + allowed < -TOLERANCE)
+    if not is_found:
         for _ in range(MOST_PASSES):
             shape = static_shapes(gap_jacobian.T, setup)
-            wanted = _least_forces(gap_jacobian @ shape, gap + allowed - gap_jacobian @ shape @ force)
-            displacement, force = displacement + shape @ (wanted - force), wanted
+            compliance = gap_jacobian @ shape + softness * np.eye(gap.size)
+            force = _least_forces(compliance, gap + allowed + gap_jacobian @ (begin - displacement))
+            displacement = begin + shape @ force
+            before = gap_jacobian
             gap, gap_jacobian = gaps(displacement, setup, clearance)
-            excess = gap + allowed
-            if np.all(excess >= -TOLERANCE) and np.all(excess[force > 0.0] <= TOLERANCE):
+            excess = gap + allowed + softness * force
+            is_turned = np.abs((gap_jacobian - before).T @ force).max() > TURNED * force.max()
+            is_shut = np.all(excess >= -TOLERANCE) and np.all(excess[force > 0.0] <= TOLERANCE)
+            if is_found := bool(is_shut and not is_turned):
                 break
         rotor, *stators = setup.model.split(displacement)
         state = replace(state, rotor_displacement=rotor, stator_displacement=tuple(stators))
     is_closed = (state.contact_force > 0.0) & (gap <= PARTED)
-    return replace(state, contact_force=np.where(is_closed, state.contact_force + force, 0.0))
+    state = replace(state, contact_force=np.where(is_closed, state.contact_force + force, 0.0))
+    return state, is_found
 
 
 def at_rest(setup: Setup, clearance: float) -> State:
     """Return the shaft at rest under its constant loads, on stators that the sag reaches, without friction.
 
-    Clearance in m; stators carry the weight that rests on them.
+    Clearance in m; stators carry the weight that rests on them, and the springs of a penalty give by it.
+
+    Raises
+    ------
+    InputError
+        The stators leave no room for the shaft, or do not hold it.
     """
     state = State.at_rest(setup.model)
     if not setup.model.sag.any():
         return state
     gap, _ = gaps(state.displacement, setup, clearance)
-    return fit_to_gaps(replace(state, contact_force=np.where(gap < 0.0, LEAST_FORCE, 0.0)), setup, clearance)
+    state = replace(state, contact_force=np.where(gap < 0.0, LEAST_FORCE, 0.0))
+    spring = setup.law.stiffness
+    state, is_found = _fitted(state, setup, clearance, softness=1.0 / spring if spring else 0.0)
+    is_held = isinstance(setup, ModalSetup) or not state.contact_force.any()  # the former takes no others
+    if not is_held:
+        pressed = gaps(state.displacement, setup, clearance)[1][state.contact_force > 0.0].any(axis=0)
+        is_held = not np.any(pressed & _unheld(setup.model))
+    if not (is_found and is_held):
+        raise InputError(
+            "initial: the loaded shaft finds no rest on the stators that it reaches; constrain them, or set "
+            'from = "contact_free"'
+        )
+    return with_overlap(state, setup, clearance) if spring else state
 
 
 def with_overlap(state: State, setup: Setup, clearance: float) -> State:
@@ -129,18 +158,28 @@ def static_shapes(force: Floats, setup: Setup) -> Floats:
     """Static displacements (n_dof, k) under forces (n_dof, k); free bodies follow by their inertia."""
     if isinstance(setup, ModalSetup):
         basis, stiffness = setup.reduced.basis, setup.reduced.stiffness
-        shapes: Floats = basis @ np.linalg.solve(0.5 * (stiffness + stiffness.T), basis.T @ force)
+        shapes: Floats = basis @ np.linalg.solve(stiffness, basis.T @ force)
         return shapes
     packed = setup.packed
-    resisting = 0.5 * (packed.stiffness + packed.stiffness.T)
-    if find_rigid_body_mode(setup.model):
-        resisting = resisting + setup.spin**2 * packed.mass
-    is_seen = packed.row >= 0
+    resisting, is_seen = packed.stiffness, packed.row >= 0
+    unheld = np.zeros(len(resisting))
+    unheld[packed.row[is_seen]] = _unheld(setup.model)[is_seen]
+    resisting = resisting + setup.spin**2 * unheld[:, np.newaxis] * packed.mass
     ordered = np.zeros((len(resisting), force.shape[1]))
     ordered[packed.row[is_seen]] = force[is_seen]
     shapes = np.zeros_like(force)
     shapes[is_seen] = np.linalg.solve(resisting, ordered)[packed.row[is_seen]]
     return shapes
+
+
+def _unheld(model: Model) -> NDArray[np.bool_]:
+    """Degrees (n_all,) of parts with a rigid-body mode, which have no static displacement."""
+    is_free = [np.zeros(body.n_dof, dtype=bool) for body in model.bodies]
+    for body, rows in zip(model.bodies, is_free, strict=True):
+        for number in range(body.part.max(initial=-1) + 1):
+            is_part = body.part == number
+            rows[is_part] = rigid_body_row(body, np.flatnonzero(is_part).tolist()) > 0
+    return np.concatenate(is_free)
 
 
 def _least_forces(compliance: Floats, gap: Floats) -> Floats:

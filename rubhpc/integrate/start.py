@@ -110,7 +110,7 @@ def _disturbed(state: State, initial: Initial, setup: Setup) -> State:
         node = model.output_node if initial.impulse_node is None else initial.impulse_node
         rotor = np.linalg.solve(model.rotor.mass, _impulse(model, node, initial))
         velocity[: rotor.size] += rotor
-    return State.of_bodies(model, displacement, velocity, np.zeros_like(state.contact_force))
+    return State.of_bodies(model, displacement, velocity, np.zeros_like(state.contact_force), state.overlap)
 
 
 def _shapes_of_output(setup: Setup, wanted: tuple[int, ...]) -> Floats:

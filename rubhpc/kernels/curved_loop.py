@@ -56,6 +56,7 @@ from rubhpc.kernels.curved_search import (
     open_crossing,
 )
 from rubhpc.kernels.curved_step import follow_loads, go_on, take_step
+from rubhpc.kernels.event_loop import stand_still
 from rubhpc.kernels.event_steps import choose_step, contact_age, end_record, longest_step, sample_step
 from rubhpc.kernels.measuring import begin_span
 from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
@@ -209,16 +210,19 @@ def advance_curved(
             if not is_event_free:
                 crossing = closed_crossing(closed, reduced.overlap, work)
         if crossing != 0 and level > 0 and closed == 0:
-            progress.halving_level = level - 1
-            continue
-        if crossing != 0 and level > 0:
+            if not stand_still(
+                crossing, tables.switch_re[mode], tables.switch_im[mode], z_re, z_im, next_re, next_im
+            ):
+                progress.halving_level = level - 1
+                continue
+        elif crossing != 0 and level > 0:
             due = min(int(first_crossing(closed, crossing, work) * (1 << level)), (1 << level) - 1)
             follow_loads(closed, (1 << level) * clock.tick, 0.0, work)
             groping = 0
             continue
         if is_sample and closed == 0:
             sample_step(tables, clock, level, z_re, z_im, progress, recorder, samples, accumulator)
-        if crossing != 0:  # an event within the next tick is taken here
+        if crossing != 0:  # an event within the next tick, or before anything moves, is taken here
             outcome = take_curved_event(
                 tables,
                 curved,

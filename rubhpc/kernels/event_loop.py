@@ -55,6 +55,8 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
+ROUNDING = 4.0 * np.finfo(np.float64).eps  # of a switch function, over the sizes of its terms
+
 
 @jit_lean_sum
 def advance(
@@ -153,12 +155,16 @@ def advance(
             crossing = find_crossing(
                 mask[mode], mode, switch_re, switch_im, rate_re, rate_im, next_re, next_im, overlap
             )
-        if crossing != 0 and level > 0:
+        if (
+            crossing != 0
+            and level > 0
+            and not stand_still(crossing, switch_re[mode], switch_im[mode], z_re, z_im, next_re, next_im)
+        ):
             progress.halving_level = level - 1
             continue
         if is_sample:
             sample_step(tables, clock, level, z_re, z_im, progress, recorder, samples, accumulator)
-        if crossing != 0:  # an event within the next tick is taken here
+        if crossing != 0:  # an event within the next tick, or before anything moves, is taken here
             outcome = take_event(
                 tables,
                 reduced,
@@ -233,3 +239,30 @@ def find_crossing(
         ):
             crossing |= 1 << i
     return crossing
+
+
+@jit_inline_sum
+def stand_still(
+    crossing: int,
+    switch_re: Floats,
+    switch_im: Floats,
+    z_re: Floats,
+    z_im: Floats,
+    next_re: Floats,
+    next_im: Floats,
+) -> bool:
+    """Whether switch functions (s, m), those of `crossing`, change over a step by rounding alone.
+
+    Shorter steps may not change them at all: where terms are much larger than their sum, as in a sag of
+    metres, a gap that closes slowly would never do so in steps of a tick.
+    """
+    for i in range(switch_re.shape[0]):
+        if (crossing >> i) & 1 == 1:
+            change, size = 0.0, 0.0
+            for k in range(z_re.size):
+                after = switch_re[i, k] * next_re[k] - switch_im[i, k] * next_im[k]
+                change += after - (switch_re[i, k] * z_re[k] - switch_im[i, k] * z_im[k])
+                size += abs(after)
+            if abs(change) > ROUNDING * size:
+                return False
+    return True

@@ -18,6 +18,7 @@ from rubhpc.kernels.contact_modes import (
 )
 from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.cubics import turning_value
+from rubhpc.kernels.event_loop import stand_still
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -210,7 +211,12 @@ def next_event(
         crossing = int(np.int64(0))  # no literal: callers are compiled for one type
         if not is_forced:
             crossing = below(then, floor)
-        if crossing != 0 and level > 0 and not is_last:
+        if (
+            crossing != 0
+            and level > 0
+            and not is_last
+            and not stand_still(crossing, switch_re, switch_im, z[0], z[1], ahead[0], ahead[1])
+        ):
             halving = level - 1
             continue
         if crossing != 0:

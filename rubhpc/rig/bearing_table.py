@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from rubhpc.errors import InputError
-from rubhpc.input.fields import FieldError, check_fields, choice, count, series
+from rubhpc.input.fields import FieldError, choice, count, series
 from rubhpc.rig.parts import Bearing
+from rubhpc.rig.supports import Support
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,14 +23,17 @@ PAIRS = ("yy", "yz", "zy", "zz")
 
 
 @dataclass(frozen=True, kw_only=True)
-class BearingTable:
+class BearingTable(Support):
     """A linear support with coefficients tabulated over the speed: a fluid-film bearing, or a seal.
 
     Every coefficient is a list with one value for each speed, or one value that holds at all of them.
 
     Attributes
     ----------
-    node : int
+    node, position, mass, myy, mzz, pedestal
+        As those of a `Bearing`; constant.
+    link : int, optional
+        Other node, of a rotor given by its matrices; by default the ground.
     speed : tuple of float, rad/s
         Rising; none negative.
     stiffness, damping : tuple of float, optional
@@ -42,7 +46,12 @@ class BearingTable:
         through every value and overshoots none; or straight lines.
     """
 
-    node: int = count(doc="Node of the shaft, from 1.", example="1")
+    link: int | None = count(
+        doc="Other node of a bearing between two nodes; only in rotors given by matrices.",
+        example="12",
+        default=None,
+        is_key=False,
+    )
     speed: tuple[float, ...] = series(
         "rad/s", doc="Speeds of the table, rising.", example='["500 rpm", "2000 rpm", "6000 rpm"]', at_least=0
     )
@@ -92,9 +101,11 @@ class BearingTable:
     def __post_init__(self) -> None:
         for declared in fields(self):
             value = getattr(self, declared.name)
-            if declared.metadata["kind"] == "series" and isinstance(value, list | float | int | np.ndarray):
+            if declared.metadata.get("kind") == "series" and isinstance(
+                value, list | float | int | np.ndarray
+            ):
                 object.__setattr__(self, declared.name, tuple(np.atleast_1d(value).tolist()))
-        check_fields(self)
+        super().__post_init__()
         if len(self.speed) < 2:
             raise FieldError(
                 "speed", "a table has at least two speeds; add one, or give a bearing without speed"

@@ -26,9 +26,6 @@ def check_carriers(carriers: Sequence[AnyCarrier], stators: Sequence[AnyStator])
     for i, name in enumerate(names, 1):
         if names.count(name) > 1:
             raise FieldError(f"carrier.{i}.name", f"{name} is duplicated; give every carrier its own name")
-        if all(stator.carrier != name for stator in stators):
-            problem = "no stator stands on it"
-            raise FieldError(f"carrier.{i}.name", f'{problem}; give one carrier = "{name}", or remove it')
     for i, stator in enumerate(stators, 1):
         if stator.carrier is None:
             continue
@@ -37,3 +34,7 @@ def check_carriers(carriers: Sequence[AnyCarrier], stators: Sequence[AnyStator])
             raise FieldError(f"stator.{i}.carrier", f"no carrier is named {stator.carrier}; {fix}")
         if stator.carrier_problem:
             raise FieldError(f"stator.{i}.carrier", stator.carrier_problem)
+    for i, name in enumerate(names, 1):
+        if all(stator.carrier != name for stator in stators):
+            problem = "no stator stands on it"
+            raise FieldError(f"carrier.{i}.name", f'{problem}; give one carrier = "{name}", or remove it')

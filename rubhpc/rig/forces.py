@@ -5,41 +5,34 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, TypeAlias
 
-from rubhpc.input.fields import check_fields, count, quantity, table
+from rubhpc.input.fields import FieldError, quantity, table
+from rubhpc.rig.places import Placed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 
 @dataclass(frozen=True, kw_only=True)
-class Unbalance:
+class Unbalance(Placed):
     """A mass at a radius, fixed to the rotor."""
 
-    node: int = count(doc="Node of the rotor, from 1.", example="8")
     mass: float = quantity("kg", doc="Unbalance mass.", example='"8 g"', at_least=0)
     radius: float = quantity("m", doc="Distance of the mass from the axis.", example='"4.5 cm"', at_least=0)
     phase: float = quantity(
         "rad", doc="Angle from +y towards +z at time zero.", example='"90 deg"', default=0.0
     )
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-
 
 @dataclass(frozen=True, kw_only=True)
-class Load:
+class Load(Placed):
     """A constant force, such as that of a belt."""
 
-    node: int = count(doc="Node of the rotor, from 1.", example="12")
     vertical: float = quantity(
         "N", doc="Vertical component, positive upwards (+y).", example='"-120 N"', default=0.0
     )
     horizontal: float = quantity(
         "N", doc="Horizontal component, positive along +z.", example='"30 N"', default=0.0
     )
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
 
 NodeForce: TypeAlias = Unbalance | Load
@@ -65,3 +58,16 @@ class RotorForces:
             value = getattr(self, declared.name)
             if isinstance(value, tuple):
                 yield from ((f"{declared.name}.{i}", force) for i, force in enumerate(value, 1))
+
+    def node_of(self, part: Placed, key: str = "") -> int:
+        """Return the node of a part; a rotor whose nodes have positions finds the one at its position.
+
+        Parameters
+        ----------
+        part : Placed
+        key : str
+            Dotted key of the part, for messages.
+        """
+        if part.node is None:
+            raise FieldError(f"{key}.position", "this kind of rotor has no positions; give node")
+        return part.node

@@ -1,4 +1,4 @@
-"""The parts of a rotor: shaft sections, discs, bearings, the torsional drive, damping.
+"""The parts of a rotor: shaft sections, sleeves, discs, bearings, the torsional drive, damping.
 
 A part that can give one thing in two ways has a method `displaced`, which returns the changes of other fields
 when some are set.
@@ -11,6 +11,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from rubhpc.input.fields import FieldError, check_fields, count, flag, pairs, quantity
+from rubhpc.rig.places import Placed
+from rubhpc.rig.supports import Springs, Support
+from rubhpc.rig.tubes import Tube
 
 MOST_ELEMENTS = 200  # of a shaft or a stator: matrices are dense, and time grows with the third power
 
@@ -50,41 +53,45 @@ UNDAMPED = Damping()
 
 
 @dataclass(frozen=True, kw_only=True)
-class ShaftSection:
-    """A cylindrical length of shaft, divided into equal Timoshenko elements."""
+class ShaftSection(Tube):
+    """A length of shaft, divided into equal Timoshenko elements.
 
-    length: float = quantity("m", doc="Length of the section.", example='"0.8 m"', above=0)
-    outer_diameter: float = quantity("m", doc="Outer diameter.", example='"20 mm"', above=0)
-    inner_diameter: float = quantity(
-        "m", doc="Diameter of the bore.", example='"8 mm"', default=0.0, at_least=0
-    )
+    It is tapered where a diameter at its right end is given: diameters change linearly along it.
+    """
+
     elements: int = count(doc="Number of equal finite elements.", example="14", at_most=MOST_ELEMENTS)
-    youngs_modulus: float = quantity("Pa", doc="Young's modulus.", example='"210 GPa"', above=0)
-    shear_modulus: float = quantity("Pa", doc="Shear modulus.", example='"79.6 GPa"', above=0)
-    density: float = quantity("kg/m^3", doc="Density.", example="7800.0", above=0)
-    shear: bool = flag(
-        doc="Whether the section deforms in shear (Timoshenko beam); false for a Rayleigh beam.",
-        example="true",
-        default=True,
-    )
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-        if self.inner_diameter >= self.outer_diameter:
-            limit = f"{self.outer_diameter:g} m"
-            raise FieldError(
-                "inner_diameter", f"{self.inner_diameter:g} m must be below outer_diameter, {limit}"
-            )
 
 
 @dataclass(frozen=True, kw_only=True)
-class Disc:
+class Sleeve(Tube, Placed):
+    """A tube on the shaft, bonded to it from one node to another: it adds mass and stiffness.
+
+    Its node or position is that of its left end; its right end is at a node too.
+    """
+
+    inner_diameter: float = quantity(
+        "m",
+        doc="Diameter of the bore, at least that of the shaft; of a tapered sleeve at its left end.",
+        example='"20 mm"',
+        above=0,
+    )
+
+    def __post_init__(self) -> None:
+        Placed.__post_init__(self)
+        Tube.__post_init__(self)
+
+    def displaced(self, keys: set[str]) -> dict[str, Any]:
+        """Return the changes of other fields when `keys` are set."""
+        return Placed.displaced(self, keys) | Tube.displaced(self, keys)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Disc(Placed):
     """A rigid disc: either diameter, thickness and density, or mass and inertias.
 
     With a mass, the diameter is that of the rim that a stator may touch.
     """
 
-    node: int = count(doc="Node of the shaft, from 1.", example="8")
     diameter: float | None = quantity(
         "m",
         doc="Diameter, also of the rim that a stator may touch.",
@@ -111,7 +118,7 @@ class Disc:
     )
 
     def __post_init__(self) -> None:
-        check_fields(self)
+        super().__post_init__()
         body = ("thickness", "density")
         lumped = ("mass", "diametral_inertia", "polar_inertia")
         if any(getattr(self, k) is not None for k in lumped):
@@ -142,90 +149,19 @@ class Disc:
 
     def displaced(self, keys: set[str]) -> dict[str, Any]:
         """Return the changes of other fields when `keys` are set."""
+        changes = super().displaced(keys)
         if self.mass is None and keys & {"mass", "diametral_inertia", "polar_inertia"}:
             lumped = dict(zip(("mass", "diametral_inertia", "polar_inertia"), self.inertia, strict=True))
-            return {"thickness": None, "density": None} | lumped
-        return {}
+            changes |= {"thickness": None, "density": None} | lumped
+        return changes
 
 
 @dataclass(frozen=True, kw_only=True)
-class Bearing:
-    """A linear support: `stiffness` and `damping` in both directions, or full 2x2 matrices."""
+class Bearing(Springs, Support):
+    """A linear support: `stiffness` and `damping` in both directions, or full 2x2 matrices.
 
-    node: int = count(doc="Node of the shaft, from 1.", example="1")
-    stiffness: float | None = quantity(
-        "N/m",
-        doc="Stiffness in both lateral directions, in place of kyy, kzz, kyz and kzy.",
-        example='"1e6 N/m"',
-        default=None,
-        at_least=0,
-    )
-    kyy: float | None = quantity(
-        "N/m", doc="Vertical stiffness.", example='"1e6 N/m"', default=None, at_least=0
-    )
-    kzz: float | None = quantity(
-        "N/m", doc="Horizontal stiffness.", example='"1e6 N/m"', default=None, at_least=0
-    )
-    kyz: float = quantity(
-        "N/m", doc="Vertical force per horizontal displacement.", example='"2e5 N/m"', default=0.0
-    )
-    kzy: float = quantity(
-        "N/m", doc="Horizontal force per vertical displacement.", example='"-2e5 N/m"', default=0.0
-    )
-    damping: float | None = quantity(
-        "N s/m",
-        doc="Damping in both lateral directions, in place of cyy, czz, cyz and czy.",
-        example='"100 N s/m"',
-        default=None,
-        at_least=0,
-    )
-    cyy: float | None = quantity(
-        "N s/m", doc="Vertical damping.", example='"100 N s/m"', default=None, at_least=0
-    )
-    czz: float | None = quantity(
-        "N s/m", doc="Horizontal damping.", example='"100 N s/m"', default=None, at_least=0
-    )
-    cyz: float = quantity(
-        "N s/m", doc="Vertical force per horizontal velocity.", example='"20 N s/m"', default=0.0
-    )
-    czy: float = quantity(
-        "N s/m", doc="Horizontal force per vertical velocity.", example='"20 N s/m"', default=0.0
-    )
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-        for one, letter in (("stiffness", "k"), ("damping", "c")):
-            for key in (f"{letter}yy", f"{letter}zz", f"{letter}yz", f"{letter}zy"):
-                if getattr(self, one) is not None and getattr(self, key) not in (None, 0.0):
-                    ways = f"{one} or {letter}yy, {letter}zz, {letter}yz, {letter}zy"
-                    raise FieldError(key, f"conflicts with {one}; give either {ways}")
-        if self.stiffness is None and (self.kyy is None or self.kzz is None):
-            key = "kyy" if self.kyy is None else "kzz"
-            raise FieldError(key, "missing; give either stiffness, or kyy and kzz")
-
-    @property
-    def stiffness_matrix(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """((kyy, kyz), (kzy, kzz)), N/m."""
-        kyy, kzz = (v if v is not None else self.stiffness or 0.0 for v in (self.kyy, self.kzz))
-        return (kyy, self.kyz), (self.kzy, kzz)
-
-    @property
-    def damping_matrix(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """((cyy, cyz), (czy, czz)), N s/m."""
-        cyy, czz = (v if v is not None else self.damping or 0.0 for v in (self.cyy, self.czz))
-        return (cyy, self.cyz), (self.czy, czz)
-
-    def displaced(self, keys: set[str]) -> dict[str, Any]:
-        """Return the changes of other fields when `keys` are set."""
-        changes: dict[str, Any] = {}
-        for one, letter in (("stiffness", "k"), ("damping", "c")):
-            common = getattr(self, one)
-            straight, crossed = (f"{letter}yy", f"{letter}zz"), (f"{letter}yz", f"{letter}zy")
-            if one in keys and not keys & {*straight, *crossed}:
-                changes |= dict.fromkeys(straight) | dict.fromkeys(crossed, 0.0)
-            elif common is not None and keys & {*straight, *crossed}:
-                changes |= dict.fromkeys(straight, common) | {one: None}
-        return changes
+    Its mass, like its springs and dampers, acts on the motion of the shaft relative to what it stands on.
+    """
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -50,12 +50,14 @@ def call_rig_function(path: Path, function: str, where: str) -> Any:
         return build()
     except RubError as error:
         raise InputError(str(error) if str(error).startswith(named) else f"{named}: {error}") from error
-    except Exception as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # sys.exit() included, which would end the program as if it were done
         frames = traceback.extract_tb(error.__traceback__)
         lines = [frame.lineno for frame in frames if frame.filename == module.__file__]
         line = getattr(error, "lineno", None) or (lines[-1] if lines else None)
         at = f"line {line}: " if line else ""
-        message = " ".join(str(error).split())[:200]
-        raise InputError(f"{named}: {at}{type(error).__name__}: {message}; fix the rig file") from error
+        texts = (type(error).__name__, " ".join(str(error).split())[:200])
+        raise InputError(f"{named}: {at}{': '.join(filter(None, texts))}; fix the rig file") from error
     finally:
         sys.path.remove(folder)

@@ -77,7 +77,11 @@ def read_rig(
     if not name.endswith(".toml") and "/" not in name and not os.path.exists(path):
         fix = nearest(name, packaged_rigs())
         raise InputError(f"{where}: neither a packaged rig nor a file {place(str(path))}; {fix}")
-    return build(Rig, read_toml(path, where), str(path))
+    table = read_toml(path, where)
+    if "grid" in table or "rig" in table:
+        rig = brief(table.get("rig", "mokhtar2017"))
+        raise InputError(f"{place(str(path))}: is a study, not a rig; give a rig, as this study does: {rig}")
+    return build(Rig, table, str(path))
 
 
 @cache

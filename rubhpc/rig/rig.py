@@ -135,9 +135,10 @@ class Rig:
     ) -> Rig:
         """Return a rig whose rotor is a `ross.Rotor` (https://ross.readthedocs.io).
 
-        Node n of ROSS, which counts from 0, is node n + 1 here. Up is ROSS's y; angles count from there in
-        the sense of positive spin, towards -x of ROSS. Axial motion is constrained at node 1 if ROSS leaves
-        it unconstrained.
+        Node n of ROSS, which counts from 0, is node n + 1 here, on the shaft or on a pedestal. Up is ROSS's
+        y; angles count from there in the sense of positive spin, towards -x of ROSS. Axial motion is
+        constrained at node 1 if ROSS leaves it unconstrained; another shaft of a `CoAxialRotor` is held at
+        its first node.
 
         Parameters
         ----------
@@ -165,7 +166,8 @@ class Rig:
         Raises
         ------
         InputError
-            When it is not such a rotor, or something that the rig needs is missing.
+            When it is not such a rotor, its shafts turn at different speeds, or something that the rig
+            needs is missing.
         """
         at = None if speed is None else parse_quantity(speed, "rad/s", "from_ross: speed")
         found = rotor_from_ross(rotor, speed=at, torsion=torsion, unbalance=_tuple(unbalance))

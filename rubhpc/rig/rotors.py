@@ -1,12 +1,13 @@
 """Rotors: a shaft with discs and bearings, or user-supplied matrices.
 
 Every kind of rotor has the forces of `RotorForces`, a `displacement_limit` and the methods `check_node`,
-`can_move`, `rim_radius` and `recorded_node`.
+`can_move`, `rim_radius` and `recorded_node`; one with bearings also `stands_on`.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import NDArray  # noqa: TC002 - annotations are read when a ri
 from rubhpc.input.fields import FieldError, check_fields, count, degrees, matrix, quantity, table
 from rubhpc.input.matrix import is_symmetric
 from rubhpc.input.messages import nearest
-from rubhpc.rig.bearing_table import AnyBearing, BearingTable  # noqa: TC001 - likewise
+from rubhpc.rig.bearing_table import AnyBearing, BearingTable
 from rubhpc.rig.forces import RotorForces
 from rubhpc.rig.matrix_body import check_body, checked_matrices
 from rubhpc.rig.parts import (
@@ -25,13 +26,18 @@ from rubhpc.rig.parts import (
     Damping,
     Disc,
     ShaftSection,
+    Sleeve,
     Torsion,
 )
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from rubhpc.rig.places import Placed
+    from rubhpc.rig.supports import Pedestal
+
 DIVERGED_SHARE = 0.1  # of the shaft length: lateral motion that no rotor survives
+AT_A_NODE = 1e-6  # of the shaft length: a position that far from a node counts as at it
 NAMES = ("u", "v", "w", "thx", "thy", "thz")
 
 
@@ -40,6 +46,7 @@ class Rotor(RotorForces):
     """A shaft with discs and bearings."""
 
     shaft: tuple[ShaftSection, ...] = table(doc="Shaft sections, from node 1.")
+    sleeve: tuple[Sleeve, ...] = table(doc="Sleeves on the shaft.", default=(), added=True)
     disc: tuple[Disc, ...] = table(doc="Rigid discs.", default=())
     bearing: tuple[AnyBearing, ...] = table(doc="Linear bearings and seals.", default=())
     torsion: Torsion = table(doc="Torsional boundary condition at the drive.", default=FIXED_AT_NODE_1)
@@ -47,34 +54,118 @@ class Rotor(RotorForces):
 
     def __post_init__(self) -> None:
         check_fields(self)
-        for key in ("shaft", "bearing"):
-            if not getattr(self, key):
-                raise FieldError(key, f"missing; a rotor has at least one [[rotor.{key}]]")
+        if not self.shaft:
+            raise FieldError("shaft", "missing; a rotor has at least one [[rotor.shaft]]")
+        if not self.bearing:
+            problem = "missing, so that the rotor floats freely"
+            raise FieldError("bearing", f"{problem}; add at least one [[rotor.bearing]]")
         if self.n_node - 1 > MOST_ELEMENTS:
             problem = f"{self.n_node - 1} elements are too many; use at most {MOST_ELEMENTS} in all sections"
             raise FieldError("shaft", problem)
-        for key in ("disc", "bearing"):
+        for key in ("disc", "bearing", "sleeve"):
             for i, item in enumerate(getattr(self, key), 1):
-                self.check_node(f"{key}.{i}.node", item.node)
+                self._check_on_shaft(f"{key}.{i}.node", self.node_of(item, f"{key}.{i}"))
+        for i, bearing in enumerate(self.bearing, 1):
+            if isinstance(bearing, BearingTable) and bearing.link is not None:
+                problem = "is only for rotors given by matrices"
+                raise FieldError(f"bearing.{i}.link", f"{problem}; add [rotor.bearing.pedestal] instead")
+        for i, sleeve in enumerate(self.sleeve, 1):
+            self._check_sleeve(f"sleeve.{i}", sleeve)
         for key, force in self.node_forces():
-            self.check_node(f"{key}.node", force.node)
+            self.check_node(f"{key}.node", self.node_of(force, key))
         for key in ("fixed_node", "node"):
-            self.check_node(f"torsion.{key}", getattr(self.torsion, key) or 1)
+            self._check_on_shaft(f"torsion.{key}", getattr(self.torsion, key) or 1)
 
     @property
     def n_node(self) -> int:
         """Number of nodes along the shaft."""
         return 1 + sum(s.elements for s in self.shaft)
 
+    @cached_property
+    def shaft_positions(self) -> NDArray[np.float64]:
+        """Distance of every node of the shaft from its left end, (n_node,), m."""
+        return np.cumsum([0.0, *(s.length / s.elements for s in self.shaft for _ in range(s.elements))])
+
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        """Distance of every node from the left end, those of pedestals after those of the shaft, m."""
+        under = [self.node_of(self.bearing[n - 1]) - 1 for n, stand in self.stands.items() for _ in stand]
+        return np.append(self.shaft_positions, self.shaft_positions[under])
+
+    @cached_property
+    def stands(self) -> dict[int, list[tuple[int, Pedestal]]]:
+        """Pedestals under each bearing, by its number, with their nodes, which follow those of the shaft."""
+        found: dict[int, list[tuple[int, Pedestal]]] = {}
+        node = self.n_node
+        for number, bearing in enumerate(self.bearing, 1):
+            found[number] = []
+            pedestal = bearing.pedestal
+            while pedestal is not None:
+                node += 1
+                found[number].append((node, pedestal))
+                pedestal = pedestal.pedestal
+        return found
+
     @property
     def displacement_limit(self) -> float:
         """Displacement beyond which a case has diverged, m."""
         return DIVERGED_SHARE * sum(section.length for section in self.shaft)
 
-    def check_node(self, key: str, node: int) -> None:
+    def stands_on(self, number: int) -> int | None:
+        """Return the node of the pedestal of a bearing, by its number; None where it stands on the ground."""
+        return next((node for node, _ in self.stands[number]), None)
+
+    def node_of(self, part: Placed, key: str = "") -> int:
+        """Return the node of a part, found by its position where that is given."""
+        if part.position is None:
+            return super().node_of(part, key)
+        return self._node_at(part.position, f"{key}.position")
+
+    def _node_at(self, position: float, key: str) -> int:
+        """Node of the shaft at a distance from its left end, m."""
+        places = self.shaft_positions
+        nearest = int(np.abs(places - position).argmin())
+        if abs(places[nearest] - position) > AT_A_NODE * places[-1]:
+            problem = (
+                f"no node is at {position:g} m; the nearest is node {nearest + 1}, at {places[nearest]:g} m"
+            )
+            raise FieldError(key, f"{problem}; change position, or length and elements of the shaft sections")
+        return nearest + 1
+
+    def _check_on_shaft(self, key: str, node: int) -> None:
         """Refuse a node that the shaft does not have."""
         if node > self.n_node:
             raise FieldError(key, f"{node} is not on the shaft; its nodes run from 1 to {self.n_node}")
+
+    def check_node(self, key: str, node: int) -> None:
+        """Refuse a node that neither the shaft nor a pedestal has."""
+        if node > self.n_node + sum(map(len, self.stands.values())):
+            self._check_on_shaft(key, node)
+
+    def sleeve_nodes(self, sleeve: Sleeve, key: str = "") -> tuple[int, int]:
+        """Return the nodes of the left and the right end of a sleeve."""
+        first = self.node_of(sleeve, key)
+        return first, self._node_at(float(self.shaft_positions[first - 1]) + sleeve.length, f"{key}.length")
+
+    def _check_sleeve(self, key: str, sleeve: Sleeve) -> None:
+        """Refuse a sleeve that ends beside a node, or into which the shaft reaches."""
+        first, last = self.sleeve_nodes(sleeve, key)
+        if first == last:
+            raise FieldError(f"{key}.length", f"{sleeve.length:g} m reaches no other node; give a longer one")
+        start, reach = self.shaft_positions[first - 1], sleeve.length
+        at = 0.0
+        for section in self.shaft:
+            ends = [min(max(x, start), start + reach) for x in (at, at + section.length)]
+            if ends[1] - ends[0] > AT_A_NODE * self.shaft_positions[-1]:
+                (outer, _), (_, bore) = section.diameters, sleeve.diameters
+                shaft = [outer[0] + (outer[1] - outer[0]) * (x - at) / section.length for x in ends]
+                inner = [bore[0] + (bore[1] - bore[0]) * (x - start) / reach for x in ends]
+                if any(a > b * (1 + AT_A_NODE) for a, b in zip(shaft, inner, strict=True)):
+                    problem = (
+                        f"{min(inner):g} m is below the outer diameter of the shaft there, {max(shaft):g} m"
+                    )
+                    raise FieldError(f"{key}.inner_diameter", f"{problem}; widen the bore")
+            at += section.length
 
     def can_move(self, node: int, angle: float) -> bool:
         """Whether a node can move in a lateral direction."""
@@ -82,12 +173,13 @@ class Rotor(RotorForces):
 
     def rim_radius(self, node: int) -> float | None:
         """Radius of the largest disc at a node, m; None without a disc that has a diameter."""
-        rims = [d.diameter / 2 for d in self.disc if d.node == node and d.diameter is not None]
+        rims = [d.diameter / 2 for d in self.disc if self.node_of(d) == node and d.diameter]
         return max(rims, default=None)
 
     def recorded_node(self, stator_nodes: Sequence[int]) -> int:
         """Node whose motion is recorded: of the first stator, else of the first disc, else the middle."""
-        return next(iter([*stator_nodes, *(disc.node for disc in self.disc)]), (self.n_node + 1) // 2)
+        discs = [self.node_of(disc) for disc in self.disc]
+        return next(iter([*stator_nodes, *discs]), (self.n_node + 1) // 2)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -154,12 +246,23 @@ class MatrixRotor(RotorForces):
         if self.output_node is not None:
             self.check_node("output_node", self.output_node)
         for i, bearing in enumerate(self.bearing, 1):
-            self.check_node(f"bearing.{i}.node", bearing.node)
+            key = f"bearing.{i}"
+            self.check_node(f"{key}.node", self.node_of(bearing, key))
+            if bearing.link is not None:
+                self.check_node(f"{key}.link", bearing.link)
+            for name in ("mass", "myy", "mzz", "pedestal"):
+                if getattr(bearing, name) is not None:
+                    problem = "cannot be given to a rotor of matrices"
+                    raise FieldError(f"{key}.{name}", f"{problem}; include it in them")
         for key, force in self.node_forces():
-            self.check_node(f"{key}.node", force.node)
+            self.check_node(f"{key}.node", self.node_of(force, key))
         if self.gravity and any(name.startswith("q") for _, name in self.degrees):
             problem = "cannot be applied to the coordinates q..."
             raise FieldError("gravity", f"{problem}; give the forces as load, or use other degrees")
+
+    def stands_on(self, number: int) -> int | None:
+        """Return the other node of a bearing between two nodes, by its number; else None."""
+        return self.bearing[number - 1].link
 
     def check_node(self, key: str, node: int) -> None:
         """Refuse a node without a lateral degree of freedom."""

@@ -75,9 +75,22 @@ class Stator(Seat):
     length: float = quantity(
         "m", doc="Length of the cantilever, in the radial direction.", example='"40 mm"', above=0
     )
-    width: float = quantity("m", doc="Width along the shaft.", example='"5 mm"', above=0)
-    height: float = quantity(
-        "m", doc="Height along the lateral (tangential) motion.", example='"5 mm"', above=0
+    width: float | None = quantity(
+        "m", doc="Width along the shaft of a rectangular section.", example='"5 mm"', default=None, above=0
+    )
+    height: float | None = quantity(
+        "m",
+        doc="Height along the lateral (tangential) motion of a rectangular section.",
+        example='"5 mm"',
+        default=None,
+        above=0,
+    )
+    diameter: float | None = quantity(
+        "m",
+        doc="Diameter of a round stator such as a screw, in place of width and height.",
+        example='"6 mm"',
+        default=None,
+        above=0,
     )
     elements: int = count(
         doc="Number of equal finite elements.", example="6", default=6, at_most=MOST_ELEMENTS
@@ -102,6 +115,12 @@ class Stator(Seat):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        sides = {"width": self.width, "height": self.height}
+        for name, side in sides.items():
+            if side is None and self.diameter is None:
+                raise FieldError(name, f'missing; add {name} = "5 mm", or diameter for a round stator')
+            if side is not None and self.diameter is not None:
+                raise FieldError(name, "conflicts with diameter; remove one of them")
         if self.geometry == SECOND_ORDER and not self.lateral:
             problem = "a stator with lateral = false does not bend"
             raise FieldError("geometry", f'{problem}; set lateral = true, or geometry = "linear"')
@@ -117,8 +136,31 @@ class Stator(Seat):
     @property
     def euler_load(self) -> float:
         """Buckling load of the cantilever, pi^2 E I / (4 L^2), N."""
-        least = self.height * self.width * min(self.height, self.width) ** 2 / 12
+        width, height = self.sides
+        is_round = self.diameter is not None
+        least = self.second_moment if is_round else height * width * min(height, width) ** 2 / 12
         return math.pi**2 * self.youngs_modulus * least / (4 * self.length**2)
+
+    @property
+    def sides(self) -> tuple[float, float]:
+        """Extent of the section along the shaft and along the lateral motion, m."""
+        if self.diameter is not None:
+            return self.diameter, self.diameter
+        assert self.width is not None
+        assert self.height is not None
+        return self.width, self.height
+
+    @property
+    def area(self) -> float:
+        """Area of the section, m^2."""
+        width, height = self.sides
+        return width * height if self.diameter is None else math.pi / 4 * width * height
+
+    @property
+    def second_moment(self) -> float:
+        """Second moment of area against lateral bending, m^4."""
+        width, height = self.sides
+        return width * height**3 / 12 if self.diameter is None else math.pi / 64 * height**4
 
 
 @dataclass(frozen=True, kw_only=True)

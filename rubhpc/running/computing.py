@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -47,13 +48,17 @@ class Computing:
         self._stopping = request.stopping
         self._grid = CaseGrid(job.study, chunk=job.chunk)
         self._sequences = self._grid.sequences()
-        self._store = Store(job.study.output)
         self._n_claim = 0  # in this round
         self._n_claimed = 0  # by all ranks, in the rounds before
         self._entered: list[Entry] = []  # of a refined map, since the last round
         self._sums = Totals()  # of all ranks, as this one last saw them
         self._unsynced: list[Path] = []
         self._next_packing = time.monotonic() + _PACKING_GAP
+
+    @cached_property
+    def _store(self) -> Store:
+        """The store, which one rank may fail to open: it is opened where all ranks learn of that."""
+        return Store(self._job.study.output)
 
     def compute(self) -> None:
         """Compute all that is missing, together with all ranks."""
@@ -87,6 +92,7 @@ class Computing:
                 is_mine = n_sequence % self._pool.size == self._pool.rank  # a block has one writer
                 if is_mine and not self._stopping.look():
                     worker.missing = np.arange(self._grid.n_case) == flat
+                    worker.is_wary = flat in job.deadly
                     worker.work(block)
 
     def _kind_of_tail(self) -> str:

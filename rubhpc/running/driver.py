@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from contextlib import ExitStack, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rubhpc.errors import RubError, StoppedEarly
+from rubhpc.errors import StoppedEarly
 from rubhpc.integrate.compilation import announced_by, seconds_compiling
 from rubhpc.running.beginning import RunRequest
 from rubhpc.running.computing import Computing
-from rubhpc.running.crash import crash
+from rubhpc.running.ending import ended_together
 from rubhpc.running.finish import finish_part, finish_run
 from rubhpc.running.job import prepare_job
 from rubhpc.running.pool import Pool, RankLost, connect, together
@@ -24,6 +23,7 @@ from rubhpc.schema import MISSING
 from rubhpc.storage.disk import disk_errors
 from rubhpc.storage.manifest import PRIVATE
 from rubhpc.storage.store import Store
+from rubhpc.streams import lasting_streams
 from rubhpc.study.parts import Part, check_parts
 from rubhpc.study.study import Study, read_study
 from rubhpc.threads import on_one_thread
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
 
 @on_one_thread
+@lasting_streams()
 def run(
     study: Study | str | os.PathLike[str],
     *,
@@ -105,7 +106,7 @@ def run(
         )
         return replace(found, run=limits, output=found.output if output is None else Path(output))
 
-    with nullcontext(connect()) if workers is None else start_workers(workers) as pool:
+    with nullcontext(connect()) if workers is None else start_workers(workers, take_part) as pool:
         return _run_in(
             pool,
             resolve,
@@ -118,6 +119,7 @@ def run(
 
 
 @on_one_thread
+@lasting_streams()
 def take_part(pool: Pool, stopping: Stopping) -> None:
     """Do a worker's part of a run; all information comes from the first rank."""
 
@@ -139,36 +141,25 @@ def _run_in(
 ) -> Summary:
     """Run what the first rank resolves, on all ranks of a pool."""
     resolved: Study | None = None
-    try:
-        with stopping as watch, ExitStack() as held:
-            watch.forward_to(pool.stop)
-            held.enter_context(announced_by(_say if pool.rank == 0 and not quiet else _say_nothing))
-            resolved = pool.from_first(resolve)
-            watch.watch(resolved.output / "STOP", resolved.run.time_limit)
-            request = RunRequest(
-                study=resolved,
-                stopping=watch,
-                retry_failed=retry_failed,
-                accept_version=accept_version,
-                quiet=quiet,
-                part=part,
-                held=held,
-            )
-            summary = _run(request, pool)
-    except RankLost as error:  # and no rank can continue
-        pool.abort(error.exit_code)
-        raise
-    except RubError:  # raised on all ranks alike
-        pool.close()
-        raise
-    except Exception as error:
-        crashed = crash(error, resolved.output / PRIVATE / "logs" if resolved else None)
-        if pool.size > 1:  # the others wait for this rank
-            print(f"rubhpc: {crashed}", file=sys.stderr)
-            pool.abort(crashed.exit_code)
-        raise crashed from error
-    pool.close()
-    return summary
+
+    def logs() -> Path | None:
+        return resolved.output / PRIVATE / "logs" if resolved else None
+
+    with ended_together(pool, logs), stopping as watch, ExitStack() as held:
+        watch.forward_to(pool.stop)
+        held.enter_context(announced_by(_say if pool.rank == 0 and not quiet else _say_nothing))
+        resolved = pool.from_first(resolve)
+        watch.watch(resolved.output / "STOP", resolved.run.time_limit)
+        request = RunRequest(
+            study=resolved,
+            stopping=watch,
+            retry_failed=retry_failed,
+            accept_version=accept_version,
+            quiet=quiet,
+            part=part,
+            held=held,
+        )
+        return _run(request, pool)
 
 
 def _say(text: str) -> None:

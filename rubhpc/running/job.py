@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.case import compile_kernels
+from rubhpc.integrate.case import compile_kernels, kernel_sets
+from rubhpc.integrate.compilation import expect_sets
 from rubhpc.running.beginning import begin, begin_part
 from rubhpc.running.case_setup import set_up_for_kernels
 from rubhpc.running.stopping import Stopped, Stopping
@@ -54,6 +55,8 @@ class Job:
     suspect : dict
         Flat index -> deaths of ranks in this case or one of its predecessors; these cases come last, each by
         itself, those of a sweep in order.
+    deadly : set of int
+        Those of them in which ranks died themselves: they are first computed in a process of their own.
     token : str
         Of the lock on the store.
     refinement : Refinement, optional
@@ -69,6 +72,7 @@ class Job:
     missing: NDArray[np.bool_]
     pending: NDArray[np.int64]
     suspect: dict[int, int]
+    deadly: set[int]
     token: str
     refinement: Refinement | None = None
 
@@ -124,6 +128,7 @@ def prepare_job(request: RunRequest, n_rank: int) -> Job:
         missing=missing,
         pending=pending,
         suspect=suspect,
+        deadly=set(deaths),
         token=request.token,
         refinement=refinement,
     )
@@ -194,9 +199,13 @@ def _warm_up(grid: CaseGrid, block: Block, stopping: Stopping) -> None:
             raise Stopped
 
     with suppress(Exception):  # an error will be reported as the reason of these cases
-        for case in grid.with_each_law(block.start):
+        cases = grid.with_each_law(block.start)
+        setups = [set_up_for_kernels(grid.study, case) for case in cases]
+        changes = cases[0].speed_law is not None
+        expect_sets(set().union(*(kernel_sets(setup, changes_speed=changes) for setup in setups)))
+        for case, setup in zip(cases, setups, strict=True):
             compile_kernels(
-                set_up_for_kernels(grid.study, case),
+                setup,
                 clearance=case.clearance,
                 friction=case.friction,
                 recording=grid.study.recording,

@@ -1,4 +1,4 @@
-"""The least knock on the ranks of a launcher: they claim the cases, and each keeps its own results."""
+"""The least knock on the ranks of a pool: they claim the cases, and each keeps its own results."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rubhpc.errors import RubError
-from rubhpc.knock_cases import Progress
-from rubhpc.knocks import dataset_of, search_of
+from rubhpc.knock_cases import Progress, dataset_of, search_of
 from rubhpc.running.crash import crash
-from rubhpc.running.pool import RankLost, Totals
+from rubhpc.running.ending import ended_together
+from rubhpc.running.pool import Totals, together
+from rubhpc.streams import lasting_streams
 from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
@@ -20,7 +21,11 @@ if TYPE_CHECKING:
 
     from rubhpc.knock_cases import LeastKnock, Search
     from rubhpc.running.pool import Pool
+    from rubhpc.running.stopping import Stopping
     from rubhpc.study.study import Study
+
+    Results = dict[str, LeastKnock]
+    Begun = tuple[Search, Results, Path | None]
 
 
 @on_one_thread
@@ -32,7 +37,7 @@ def least_knock_on(
     nodes: Sequence[int],
     most: float | None,
     tolerance: float,
-    progress: Path,
+    progress: Path | None,
     report: Callable[[int, int], None],
 ) -> xr.Dataset:
     """Return on all ranks what `rubhpc.least_knock` returns on one.
@@ -42,7 +47,7 @@ def least_knock_on(
     pool : Pool
     read : callable
         Reads the study, on the first rank.
-    progress : Path
+    progress : Path, optional
         A file that keeps the results of cases that are done; ranks after the first add their number to it.
     report : callable
         Called on the first rank with the number of cases that are done, and of all.
@@ -52,60 +57,64 @@ def least_knock_on(
     InputError
         As by `least_knock`, or a rank could not keep its results; on all ranks.
     """
-    try:
 
-        def begin() -> tuple[Search, dict[str, LeastKnock]]:
-            search = search_of(read(), angles=angles, nodes=nodes, most=most, tolerance=tolerance)
-            found = Progress(progress).found
-            if search.left(found):
-                search.compile()  # once, before all ranks do so at the same time
-            return replace(search), found  # without its grid, which every rank makes for itself
+    def begin() -> Begun:
+        search = search_of(read(), angles=angles, nodes=nodes, most=most, tolerance=tolerance)
+        found = Progress(progress).found
+        if search.left(found):
+            search.compile()  # once, before all ranks do so at the same time
+        return replace(search), found, progress  # without its grid, which every rank makes for itself
 
-        search, found = pool.from_first(begin)
-        error = None
-        try:
-            _take_cases(pool, search, found, Progress(progress, pool.rank), report)
-        except RankLost:
-            raise
-        except RubError as trouble:
-            error = trouble
-        for other in pool.gather(error):
-            if other is not None:
-                raise other
-        for own in pool.gather(found):
+    return dataset_of(*_search_on(pool, begin, report))
+
+
+@on_one_thread
+@lasting_streams()
+def take_part(pool: Pool, stopping: Stopping) -> None:
+    """Do a worker's part of a search; all information comes from the first rank."""
+
+    def unknown() -> Begun:
+        raise AssertionError("a worker is not the first rank")
+
+    _search_on(pool, unknown, lambda done, n_case: None)
+
+
+def _search_on(
+    pool: Pool, begin: Callable[[], Begun], report: Callable[[int, int], None]
+) -> tuple[Search, Results]:
+    """Search the cases that are left, together; returns the results of all."""
+    with ended_together(pool):
+        search, found, progress = pool.from_first(begin)
+
+        def work() -> Results:
+            try:
+                return _take_cases(pool, search, found, Progress(progress, pool.rank), report)
+            except RubError:
+                raise
+            except Exception as error:
+                raise crash(error) from error
+
+        for own in together(pool, work):
             found = found | own
-        made = dataset_of(search, found)
-    except RankLost as lost:
-        pool.abort(lost.exit_code)
-        raise
-    except RubError:  # on all ranks alike
-        pool.close()
-        raise
-    except Exception as problem:
-        crashed = crash(problem, None)
-        if pool.size > 1:  # the others wait for this rank
-            print(f"rubhpc: {crashed}", flush=True)
-            pool.abort(crashed.exit_code)
-        raise crashed from problem
-    pool.close()
-    return made
+        return search, found
 
 
 def _take_cases(
     pool: Pool,
     search: Search,
-    found: dict[str, LeastKnock],
+    found: Results,
     kept: Progress,
     report: Callable[[int, int], None],
-) -> None:
+) -> Results:
     """Search one case after another until none is left; results are kept, and added to those found."""
-    left, n_case = search.left(found), search.grid.n_case
+    found, left, n_case = dict(found), search.left(found), search.grid.n_case
     if pool.rank == 0:
         report(n_case - len(left), n_case)
-    while (number := pool.claim().claimed) < len(left):
-        index = left[number]
+    while not (sums := pool.claim()).stop and sums.claimed < len(left):
+        index = left[sums.claimed]
         found[search.key(index)] = one = search.of_case(index)
         kept.enter(search.key(index), one)
         done = pool.add(Totals(done=1)).done + 1
         if pool.rank == 0:
             report(n_case - len(left) + done, n_case)
+    return found

@@ -97,10 +97,10 @@ def _end_with_hydra() -> None:
     thread, so that the kernel's "parent" is the proxy, for as long as this process lives.
     """
     try:
-        name = Path(f"/proc/{_PARENT}/comm").read_text()
+        name = Path(f"/proc/{_PARENT}/comm").read_bytes()
     except OSError:
         return
-    if sys.platform == "linux" and name.startswith("hydra"):
+    if sys.platform == "linux" and name.startswith(b"hydra"):
         import ctypes  # not for --help
 
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, int(signal.SIGKILL), 0, 0, 0)
@@ -111,10 +111,10 @@ def _is_orphan_from_birth() -> bool:
     if _PARENT != 1:
         return False
     try:
-        name = Path("/proc/1/cmdline").read_text()
+        name = Path("/proc/1/cmdline").read_bytes()
     except OSError:
         return False
-    return not any(part in name for part in ("mpi", "prte", "orte", "hydra", "slurm"))
+    return not any(part in name for part in (b"mpi", b"prte", b"orte", b"hydra", b"slurm"))
 
 
 def end_with_launcher() -> None:

@@ -25,6 +25,7 @@ from rubhpc.storage.parts import Shares
 from rubhpc.storage.refined import Refinement, status_of
 from rubhpc.storage.resume import cases_without_files, grid_for, is_store, missing_share
 from rubhpc.storage.store import Store
+from rubhpc.study.axis_ranges import axis_ranges
 from rubhpc.study.parts import Part, check_parts, share_out
 from rubhpc.study.sampling import CASE
 from rubhpc.threads import on_one_thread
@@ -71,6 +72,8 @@ class Plan:
         Approximate peak memory of a process, bytes; 0 where no case was timed.
     timing : Timing
         What the pilot cases have shown.
+    ranges : tuple of str
+        Range of each axis.
     warnings : tuple of str
         Unstable speeds, a sag beyond the clearance, modes without damping.
     n_expected : int or None
@@ -96,6 +99,7 @@ class Plan:
     timing: Timing
     start_up: float = 0.0
     memory: float = 0.0
+    ranges: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     part: str = ""
     n_expected: int | None = None
@@ -163,6 +167,7 @@ class Plan:
             [
                 f"{self.title} -> {self.store}",
                 f"cases       {n_case} = {sizes}",
+                *(f"            {text}" for text in self.ranges),
                 f"blocks      {self.n_block}, at most {self.n_per_block} cases each; {self._idle}",
                 f"store       {_size(self.n_byte)} before compression, {self._files}",
                 *([f"memory      {_size(self.memory)} a process, about{compiled}"] if self.memory else []),
@@ -283,6 +288,7 @@ def make_plan(study: Study, part: str | None = None, say: Callable[[str], None] 
         most_core_hours=most / 3600,
         timing=timing,
         memory=memory if timing.n_pilot else 0.0,
+        ranges=axis_ranges(grid),
         warnings=grid.warnings(),
         part="" if chosen is None else str(chosen),
         n_expected=n_expected,

@@ -83,8 +83,8 @@ class Pool(Protocol):
     def stop(self) -> None:
         """Have the others stop as this one does, unless a launcher sends its signals to all."""
 
-    def abort(self, code: int) -> None:
-        """End the other processes of the run now, or this one where a launcher then ends them."""
+    def abort(self, code: int, text: str = "") -> None:
+        """End the other processes of the run now, or report a text and end this one where that ends them."""
 
 
 class Alone:
@@ -130,7 +130,7 @@ class Alone:
     def stop(self) -> None:
         """See Pool."""
 
-    def abort(self, code: int) -> None:
+    def abort(self, code: int, text: str = "") -> None:
         """See Pool."""
 
 
@@ -214,10 +214,9 @@ class Ranks:
     def stop(self) -> None:
         """See Pool."""
 
-    def abort(self, code: int) -> NoReturn:
+    def abort(self, code: int, text: str = "") -> NoReturn:
         """See Pool."""
-        sys.stdout.flush()
-        sys.stderr.flush()
+        last_words(text)
         time.sleep(_PASSED_ON)
         self._comm.Abort(code)
         os._exit(code)
@@ -255,6 +254,14 @@ class Ranks:
             return bool(self._comm.Is_revoked()) or self._comm.Get_failed().size > 0
         except (AttributeError, NotImplementedError, self._mpi.Exception):  # MPI without fault tolerance
             return False
+
+
+def last_words(text: str) -> None:
+    """Report a text, if any, before the process ends at once."""
+    if text:
+        print(f"rubhpc: {text}", file=sys.stderr)
+    sys.stdout.flush()
+    sys.stderr.flush()
 
 
 def together(pool: Pool, work: Callable[[], T]) -> list[T]:

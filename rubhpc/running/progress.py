@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from rubhpc.running.pool import Totals
 
 _REDRAW = 0.2  # s between redraws of the bar
+_LONG_CASE = 5.0  # s that a case takes until its progress is shown
 _FIRST_LINE, _LONGEST_GAP = 10.0, 300.0  # s between lines: they grow rarer as a run grows long
 
 
@@ -55,7 +56,7 @@ class Progress:
         self._began = self._shown - seconds_compiling()
         self._gap = _FIRST_LINE
         self._bar: Bar | None = None
-        self._doing = ""
+        self._doing, self._doing_since = "", self._shown
 
     def __enter__(self) -> Self:
         if self._quiet:
@@ -106,13 +107,16 @@ class Progress:
             self._bar.update(self._bar.task_ids[0], completed=n_ended, total=total, rest=self._rest(sums))
 
     def say(self, doing: str) -> None:
-        """Take what the case that is computed here has come to, of a case that takes long; "" at its end."""
+        """Take what the case that is computed here has come to; "" at its end."""
+        if not (doing and self._doing):
+            self._doing_since = time.monotonic()
         self._doing = doing
 
     def _rest(self, sums: Totals) -> str:
         """Rate, time left (by predicted steps, for cases differ) and what went wrong."""
         seconds = max(time.monotonic() - seconds_compiling() - self._began, 1e-9)
-        texts = [self._doing] if self._doing else []
+        is_long = self._doing and time.monotonic() - self._doing_since > _LONG_CASE
+        texts = [self._doing] if is_long else []
         if sums.n_case or not texts:
             texts.append(f"{sums.n_case / seconds:.3g} a second")
         if sums.cost and self._n_done + sums.n_case <= self._n_case:

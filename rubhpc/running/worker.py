@@ -20,6 +20,8 @@ from rubhpc.running.initial_states import InitialState, InitialStates
 from rubhpc.running.kept_setups import KeptSetups
 from rubhpc.running.pool import Totals
 from rubhpc.running.stopping import Stopped
+from rubhpc.running.trial import CaseDied, try_apart
+from rubhpc.running.watchdog import PATIENCE
 from rubhpc.schema import DIVERGED, DONE, FAILED
 from rubhpc.storage.journal import Entry
 from rubhpc.storage.store import case_checksum
@@ -65,6 +67,8 @@ class Worker:
         Called with the progress of a long case.
     is_wanted_elsewhere : callable
         Called after every case; true: store what is done of the block and leave the rest.
+    is_wary : bool
+        Whether a case is first computed in a process of its own, since ranks died in it.
     """
 
     grid: CaseGrid
@@ -83,6 +87,7 @@ class Worker:
         self._initial_states = InitialStates(self.grid, self.store, self.ledger, self._repair)
         self.say: Callable[[str], None] = lambda _: None
         self.is_wanted_elsewhere: Callable[[], bool] = lambda: False
+        self.is_wary = False
         self.held = HeldBlocks(
             self.store, self.ledger, self.journal, is_refined=self.grid.study.refine is not None
         )
@@ -161,7 +166,11 @@ class Worker:
         """Compute a case and put its arrays into those of the block; an error becomes its reason to fail."""
         self.watch.begin(flat, case.id)
         try:
-            record = self._compute(case, start)
+            if self.is_wary:
+                self.watch.end()
+                try_apart(self.grid.study, case, start.state, self._check(PATIENCE))
+                self.watch.begin(flat, case.id)
+            record = record_of(self.grid, case, self._setups, start.state, self._check(), self.say)
             put_any(record, data, i_case)
             measures = packed_measures(record, self._record_type).tobytes()
         except Stopped:
@@ -172,13 +181,14 @@ class Worker:
             return Entry(flat, case.id, FAILED, reason=_reason(error))
         finally:
             self.watch.end()
+            self.say("")
         remark = "; ".join(text for text in (start.note, record.remark) if text)
         return Entry(flat, case.id, record.status, case_checksum(data, i_case), measures, remark)
 
-    def _compute(self, case: Case, start: InitialState) -> Record | BranchRecord | RunUpRecord:
-        study = self.grid.study
+    def _check(self, patience: float = 0.0) -> Callable[[], None]:
+        """A function that ends a case which begins now: when the run stops, or its time (s) is over."""
         limit = self.watch.limit
-        end = time.monotonic() + limit if limit else float("inf")
+        end = time.monotonic() + limit + patience if limit else float("inf")
 
         def check() -> None:
             self.attend()
@@ -187,16 +197,25 @@ class Worker:
             if time.monotonic() > end:
                 raise _OverTime(f"over its time limit of {limit:g} s")
 
-        if study.branch is not None:
-            axis = study.axis(study.branch.along)
-            operation = operation_of(self.grid, case)
-            try:
-                return record_branches(operation, study.branch, axis, study.recording, check, self.say)
-            finally:
-                self.say("")
-        setup = self._setups.of(case)
-        initial = case.initial if start.state is None else State.unpacked(start.state, setup.model)
-        return integrate(study, case, setup, initial, check)
+        return check
+
+
+def record_of(
+    grid: CaseGrid,
+    case: Case,
+    setups: KeptSetups,
+    state: NDArray[np.float64] | None,
+    check: Callable[[], None] = lambda: None,
+    say: Callable[[str], None] = lambda _: None,
+) -> Record | BranchRecord | RunUpRecord:
+    """The record of a case of any kind, from a stored state if there is one."""
+    study = grid.study
+    if study.branch is not None:
+        axis = study.axis(study.branch.along)
+        return record_branches(operation_of(grid, case), study.branch, axis, study.recording, check, say)
+    setup = setups.of(case)
+    initial = case.initial if state is None else State.unpacked(state, setup.model)
+    return integrate(study, case, setup, initial, check, say)
 
 
 def integrate(
@@ -205,6 +224,7 @@ def integrate(
     setup: Setup,
     initial: State | Initial,
     check: Callable[[], None] | None = None,
+    say: Callable[[str], None] = lambda _: None,
 ) -> Record | RunUpRecord:
     """The record of a case, at its speed or over its speeds; `check` is called several times a second."""
     if case.speed_law is None:
@@ -215,6 +235,7 @@ def integrate(
             recording=study.recording,
             initial=initial,
             check=check,
+            say=say,
         )
     return record_run_up(
         setup,
@@ -224,10 +245,11 @@ def integrate(
         recording=study.recording,
         initial=initial,
         check=check,
+        say=say,
     )
 
 
 def _reason(error: Exception) -> str:
     """An error as the reason of a failed case, in one line."""
     text = " ".join(str(error).split())
-    return text if isinstance(error, _OverTime) else f"{type(error).__name__}: {text}"
+    return text if isinstance(error, (_OverTime, CaseDied)) else f"{type(error).__name__}: {text}"

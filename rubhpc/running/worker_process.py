@@ -14,9 +14,7 @@ def main(arguments: list[str]) -> None:
     try:
         with Stopping() as stopping:  # before the imports below, which take a second
             pool = join(arguments)
-            from rubhpc.running.driver import take_part
-
-            take_part(pool, stopping)
+            pool.part()(pool, stopping)
     except RubError as error:
         sys.exit(error.exit_code)
 

@@ -12,25 +12,28 @@ import os
 import signal
 import socket
 import subprocess
-import sys
 import tempfile
 import threading
 import time
 from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import numpy as np
 
+from rubhpc.children import command, environment
 from rubhpc.errors import InputError, RubError
 from rubhpc.running.launch import launch, move_to
-from rubhpc.running.pool import RankLost, Totals
-from rubhpc.threads import VARIABLES
+from rubhpc.running.pool import RankLost, Totals, last_words
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from types import TracebackType
+
+    from rubhpc.running.pool import Pool
+    from rubhpc.running.stopping import Stopping
+
+    Part = Callable[[Pool, Stopping], object]
 
 T = TypeVar("T")
 
@@ -88,7 +91,8 @@ class _Shared:
 class Parent(_Shared):
     """The first rank, with the workers that it started; as a context it leaves none behind."""
 
-    def __init__(self, size: int) -> None:
+    def __init__(self, size: int, part: Part) -> None:
+        self._part = part
         self._file = tempfile.TemporaryFile()  # noqa: SIM115 - open as long as the run
         super().__init__(0, size, Sums(self._file.fileno()))
         self._workers: list[tuple[subprocess.Popen[bytes], Connection]] = []
@@ -99,14 +103,14 @@ class Parent(_Shared):
             handles = (there.fileno(), self._file.fileno())
             with there:
                 process = subprocess.Popen(
-                    [sys.executable, "-m", f"{__package__}.worker_process"]
-                    + [str(number) for number in (*handles, rank, self.size, os.getpid())],
+                    command(f"{__package__}.worker_process", *handles, rank, self.size, os.getpid()),
                     pass_fds=handles,
-                    env=_environment(),
+                    env=environment(),
                     stdin=subprocess.DEVNULL,
                     start_new_session=True,  # Ctrl-C is passed on by the parent, as other signals are
                 )
             self._workers.append((process, Connection(here.detach())))
+        self._send(self._part)
         return self
 
     def __exit__(
@@ -163,7 +167,7 @@ class Parent(_Shared):
     def close(self) -> None:
         """See Pool."""
 
-    def abort(self, code: int) -> None:
+    def abort(self, code: int, text: str = "") -> None:
         """See Pool."""
         for process, _ in self._workers:
             process.kill()
@@ -202,15 +206,20 @@ class Child(_Shared):
         self.rank, self.size = self._receive()
         move_to(self.rank, self.size)
 
+    def part(self) -> Part:
+        """What to do, as the parent has sent it first."""
+        found: Part = self._receive()
+        return found
+
     def stop(self) -> None:
         """Nothing: the parent stops the others."""
 
     def close(self) -> None:
         """See Pool."""
 
-    def abort(self, code: int) -> None:
+    def abort(self, code: int, text: str = "") -> None:
         """See Pool: this one ends, and the others continue without it."""
-        sys.stderr.flush()
+        last_words(text)
         os._exit(code)
 
     def _receive(self) -> Any:
@@ -221,8 +230,14 @@ class Child(_Shared):
 
 
 @contextmanager
-def start_workers(count: int) -> Iterator[Parent]:
+def start_workers(count: int, part: Part) -> Iterator[Parent]:
     """So many processes for a run, this one among them.
+
+    Parameters
+    ----------
+    count : int
+    part : callable
+        What the others do, a function of a module.
 
     Raises
     ------
@@ -233,13 +248,20 @@ def start_workers(count: int) -> Iterator[Parent]:
         raise InputError(f"workers: {count} is out of range; it must be at least 1")
     if launch().size > 1:
         raise InputError("workers: mpirun has started several processes already; use one of the two")
-    with Parent(count) as parent:
+    with Parent(count, part) as parent:
         yield parent
 
 
 def join(arguments: list[str]) -> Child:
     """Join the run that started this process with these arguments, and end with its parent."""
     pipe, file, rank, size, parent = map(int, arguments)
+    end_with(parent)
+    move_to(rank, size)
+    return Child(Connection(pipe), Sums(file), rank, size)
+
+
+def end_with(parent: int) -> None:
+    """End this process soon after its parent has died."""
 
     def watch() -> None:
         while os.getppid() == parent:
@@ -247,12 +269,3 @@ def join(arguments: list[str]) -> Child:
         os._exit(_ORPHANED)
 
     threading.Thread(target=watch, name="parent watch", daemon=True).start()
-    move_to(rank, size)
-    return Child(Connection(pipe), Sums(file), rank, size)
-
-
-def _environment() -> dict[str, str]:
-    """That of a worker: one thread, and this very package."""
-    place = str(Path(__file__).parents[2])
-    path = os.pathsep.join(filter(None, [place, os.environ.get("PYTHONPATH", "")]))
-    return {**os.environ, **dict.fromkeys(VARIABLES, "1"), "PYTHONPATH": path}

@@ -14,16 +14,26 @@ from rubhpc.units import typed_quantity
 if TYPE_CHECKING:
     from rubhpc.storage.manifest import Manifest
 
+_MOST = 3  # differences of a subject that are shown
+
 
 def differences(stored: Manifest, asked: Manifest) -> list[str]:
     """What keeps a study out of a store, a text each.
 
     Its axes may have grown, anywhere, and the order of their values may be another.
     """
-    found = _grouped([leaf for leaf in _leaves(stored.parts, asked.parts) if leaf[1] != leaf[2]])
-    if stored.dims != asked.dims:
-        found.append(f"axes were {', '.join(stored.dims)}, are {', '.join(asked.dims)}")
-        return found
+    has_other_axes = stored.dims != asked.dims
+    found = _by_subject(
+        [
+            leaf
+            for leaf in _leaves(stored.parts, asked.parts)
+            if leaf[1] != leaf[2] and not (has_other_axes and leaf[0].startswith("axes."))
+        ]
+    )
+    if len(found) > 1:  # the version of the physics depends on the study
+        found = [text for text in found if not text.startswith("physics ")]
+    if has_other_axes:
+        return [f"axes were {', '.join(stored.dims)}, are {', '.join(asked.dims)}", *found]
     for dim in stored.dims:
         lost = sorted(set(stored.points.along(dim)) - set(asked.points.along(dim)))
         own = [axis for axis in stored.axes if axis.dimension == dim]
@@ -36,6 +46,9 @@ def differences(stored: Manifest, asked: Manifest) -> list[str]:
             n_mine, n_yours = (dict(zip(m.dims, m.shape, strict=True))[dim] for m in (stored, asked))
             why = "n can only grow" if n_yours < n_mine else "this SALib or SciPy draws other points"
             found.append(f"the sample lacks {len(lost)} of its {n_mine} cases ({why})")
+    room, needed = (manifest.sizes.get("revolution", 0) for manifest in (stored, asked))
+    if not found and room != needed:
+        found.append(f"run_up.time: its arrays have room for {room} revolutions, and a case needs {needed}")
     is_same = (stored.identity, stored.keep, stored.sizes) == (asked.identity, asked.keep, asked.sizes)
     if not found and not is_same:
         found.append("its identity")
@@ -48,6 +61,20 @@ def is_other_version(stored: Manifest, asked: Manifest) -> bool:
     return stored.parts != same and not differences(
         replace(stored, parts=same, identity=asked.identity), asked
     )
+
+
+def _by_subject(leaves: list[tuple[str, Any, Any]]) -> list[str]:
+    """Texts of a few leaves of each subject, such as rig.rotor, and how many more there are."""
+    subjects: dict[str, list[tuple[str, Any, Any]]] = {}
+    for leaf in leaves:
+        parts = leaf[0].split(".")
+        subjects.setdefault(".".join(parts[: 1 + (parts[0] == "rig")]), []).append(leaf)
+    texts = []
+    for subject, members in subjects.items():
+        grouped = _grouped(members)
+        n_more = len(grouped) - _MOST
+        texts += grouped[:_MOST] + ([f"{n_more} more of {subject}"] if n_more > 0 else [])
+    return texts
 
 
 def _grouped(leaves: list[tuple[str, Any, Any]]) -> list[str]:
@@ -82,4 +109,4 @@ def _leaves(mine: Any, yours: Any, key: str = "") -> list[tuple[str, Any, Any]]:
 
 def _short(value: Any) -> str:
     text = "absent" if value is None else json.dumps(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+    return text if len(text) <= 40 else text[:37] + "..."

@@ -10,7 +10,7 @@ import uuid
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from rubhpc.errors import StoreError
+from rubhpc.errors import StoreError, lacks_inodes, reason_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -124,6 +124,8 @@ def disk_errors(place: Path) -> Iterator[None]:
         yield
     except OSError as error:
         text = _ADVICE.get(error.errno or 0) or str(error.strerror or error).lower()
+        if lacks_inodes(error, place):
+            text = f"{reason_of(error, place)} and run the same command again"
         raise StoreError(f"{place}: {text}") from error
 
 

@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
 _RECORD = 64  # bytes of the current case; the evidence follows
 _MOST = 2**20  # bytes with its evidence, at most
-_CRASHES = 2  # deaths by a fatal signal or for lack of memory after which a case has failed
-_DEATHS = 5  # deaths of unknown cause: the launcher may have been killed, or the power cut
 _OVERRUN = "over its time limit"
 
 
@@ -42,7 +40,7 @@ class InProgress:
         self._path = directory / f"run{run:06d}-{writer}-{uuid.uuid4().hex[:12]}"
         self._handle = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
         os.write(self._handle, b" " * (_RECORD - 1) + b"\n")
-        os.write(self._handle, f"{socket.gethostname()} {_oom_kills()}\n".encode())
+        os.write(self._handle, f"{socket.gethostname()} {oom_kills()}\n".encode())
         self._has_tracer = not faulthandler.is_enabled()
         if self._has_tracer:
             faulthandler.enable(self._handle)
@@ -74,9 +72,10 @@ class RankDeaths:
     Attributes
     ----------
     failed : dict
-        Flat index -> why the case is not to be tried again.
+        Flat index -> why the case is not to be tried again: it did not return within its time limit.
     suspect : dict
-        Flat index -> deaths, of cases that are to be computed last, each by itself.
+        Flat index -> deaths, of cases that are to be computed last, each by itself: after a fatal signal, for
+        lack of memory, or in two runs; one kill without a cause may have been that of all processes.
     """
 
     failed: dict[int, str]
@@ -94,9 +93,8 @@ def read_deaths(
     With a `share` of the cases, (n_case,), records of no case or of others are left alone: their ranks may
     be at work.
     """
-    crashes: Counter[int] = Counter()
     deaths: Counter[int] = Counter()
-    causes: dict[int, str] = {}
+    crashed: set[int] = set()
     failed: dict[int, str] = {}
     for record in sorted(directory.glob("run*")) if directory.is_dir() else ():
         found = _read(record)
@@ -110,14 +108,8 @@ def read_deaths(
         if evidence.startswith(_OVERRUN):
             failed[flat] = evidence
         elif evidence:
-            crashes[flat] += 1
-            causes[flat] = evidence
-    for flat, n in deaths.items():
-        if crashes[flat] >= _CRASHES:
-            failed.setdefault(flat, f"its rank died {crashes[flat]} times while computing it: {causes[flat]}")
-        elif n >= _DEATHS:
-            failed.setdefault(flat, f"its rank died {n} times while computing it, of unknown cause")
-    suspect = {flat: n for flat, n in deaths.items() if flat not in failed and (n > 1 or crashes[flat])}
+            crashed.add(flat)
+    suspect = {flat: n for flat, n in deaths.items() if flat not in failed and (n > 1 or flat in crashed)}
     return RankDeaths(failed, suspect)
 
 
@@ -163,10 +155,10 @@ def _cause(evidence: str) -> str:
 def _out_of_memory(where: str) -> str:
     host, _, n_kill = where.partition(" ")
     is_here = host == socket.gethostname() and n_kill.isdigit()
-    return "killed, because the machine ran out of memory" if is_here and _oom_kills() > int(n_kill) else ""
+    return "killed, because the machine ran out of memory" if is_here and oom_kills() > int(n_kill) else ""
 
 
-def _oom_kills() -> int:
+def oom_kills() -> int:
     """Processes this machine has killed for lack of memory since it started; 0 where that is unknown."""
     try:
         lines = Path("/proc/vmstat").read_text().splitlines()

@@ -11,6 +11,7 @@ from zlib import crc32
 
 import numpy as np
 
+from rubhpc.errors import printable
 from rubhpc.schema import STATUS
 from rubhpc.storage.disk import NotRegular, open_regular
 from rubhpc.storage.journal import journals
@@ -156,7 +157,7 @@ def _replay_file(path: Path, header: Header, ledger: Ledger) -> int:
                 if len(cases) == _BATCH:
                     _enter(ledger, kind, cases, records)
             if reason:
-                reasons[flat] = reason
+                reasons[flat] = printable(reason)
             elif reasons:
                 reasons.pop(flat, None)
     _enter(ledger, kind, cases, records)

@@ -1,7 +1,8 @@
 """One run at a time on a store: a lock that names its holder and is reclaimed when the holder is dead.
 
 The lock is a file that comes into being whole (a hard link of a finished one). Its holder touches it every
-few seconds. On the holder's own host a dead process gives it away; elsewhere, a heartbeat that has stopped.
+few seconds. Where the holder's process would be seen, a dead one gives it away; elsewhere, as on another host
+or in another container of the same host name, a heartbeat that has stopped.
 """
 
 from __future__ import annotations
@@ -15,8 +16,10 @@ import time
 import uuid
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
+from zlib import crc32
 
 from rubhpc.errors import StoreError
 from rubhpc.storage.disk import remove
@@ -28,7 +31,7 @@ if TYPE_CHECKING:
 
 HEARTBEAT = 10.0  # s between touches of the lock
 STALE_AFTER = (
-    180.0  # s without a heartbeat, for holders on other hosts; network file systems cache for a minute
+    180.0  # s without a heartbeat, for holders that are not seen; network file systems cache for a minute
 )
 _LATEST = 4e9  # s since 1970: a later start is no time
 ORPHAN_PATIENCE = 15.0  # s to wait for a holder whose launcher has ended: it is about to stop
@@ -42,7 +45,8 @@ class InUse(StoreError):  # noqa: N818 - it is a state, not an error
 class Holder:
     """The process that holds a lock; `born` and `parent` identify it among others with its number.
 
-    `part` is the part of the study that it computes, in run number `run`; "" and 0 of a whole run.
+    `part` is the part of the study that it computes, in run number `run`; "" and 0 of a whole run. `space` is
+    where numbers of processes mean the same as to it, in addition to the host; "" where that is unknown.
     """
 
     host: str
@@ -53,6 +57,7 @@ class Holder:
     token: str
     part: str = ""
     run: int = 0
+    space: str = ""
 
     def __str__(self) -> str:
         since = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(self.since))
@@ -73,13 +78,29 @@ class Holder:
             token=uuid.uuid4().hex,
             part=part,
             run=run,
+            space=process_space(),
         )
+
+    @property
+    def is_near(self) -> bool:
+        """Whether its process would be seen from here."""
+        return (self.host, self.space) == (socket.gethostname(), process_space())
+
+
+@cache
+def process_space() -> str:
+    """Identify the numbers of processes that this one sees: of a container, of a machine since boot."""
+    try:
+        boot = Path("/proc/sys/kernel/random/boot_id").read_text()
+        return f"{crc32((boot + os.readlink('/proc/self/ns/pid')).encode()):08x}"
+    except OSError:
+        return ""
 
 
 def process_state(pid: int) -> tuple[str, int, str] | None:
     """State letter, parent and birth (ticks after boot) of a process on this host; None: no such process."""
     try:
-        text = Path(f"/proc/{pid}/stat").read_text()
+        text = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace")
     except OSError:
         # Without /proc only existence can be checked.
         try:
@@ -113,15 +134,15 @@ def heartbeat_age(path: Path) -> float:
 
 def is_alive(holder: Holder, path: Path) -> bool:
     """Whether the holder of the lock at `path` still runs, as far as can be seen from here."""
-    if holder.host != socket.gethostname():
+    if not holder.is_near:
         return heartbeat_age(path) < STALE_AFTER
     state = process_state(holder.pid)
     return state is not None and state[0] not in "ZX" and state[2] == holder.born
 
 
 def _is_orphan(holder: Holder) -> bool:
-    """Whether the holder, on this host, has lost the launcher that started it."""
-    state = process_state(holder.pid) if holder.host == socket.gethostname() else None
+    """Whether the holder, if it is seen, has lost the launcher that started it."""
+    state = process_state(holder.pid) if holder.is_near else None
     return state is not None and state[1] != holder.parent
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rubhpc.schema import VARIABLES, Variable
 from rubhpc.study.axes import DIRECTION, FROM_REST, SWEEPS, meanings_of
+from rubhpc.study.points import MOST_CASES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -64,7 +65,8 @@ def check_fit(manifest: Any) -> None:
     dims, shape, chunk, sizes = manifest.dims, manifest.shape, manifest.chunk, manifest.sizes
     measures = [variable.name for variable in manifest.measures]
     lengths = dict(zip(dims, shape, strict=True))
-    _require(manifest.n_case > 0, sizes["stator"] < _MOST_STATORS, set(manifest.added) <= set(measures))
+    _require(0 < manifest.n_case <= MOST_CASES, sizes["stator"] < _MOST_STATORS)
+    _require(set(manifest.added) <= set(measures))
     _require(len(chunk) == len(dims), all(0 < n < _MOST for n in chunk), len(set(measures)) == len(measures))
     _require(manifest.shard == () or len(manifest.shard) == len(dims))
     _require(*(s > 0 and s % n == 0 for s, n in zip(manifest.shard, chunk, strict=False)))
@@ -98,7 +100,7 @@ def _require(*held: bool) -> None:
 
 
 def _is_text(value: object) -> bool:
-    return isinstance(value, str)
+    return isinstance(value, str) and value.isprintable()
 
 
 def _is_number(value: object) -> bool:

@@ -1,68 +1,38 @@
-"""The files of a store for zarr: only regular ones are read; waiting blocks appear in their shards."""
+"""The files of a store for zarr: those that are checked, with waiting blocks in their shards."""
 
 from __future__ import annotations
 
 import asyncio
-import stat
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from zarr.abc.store import RangeByteRequest, SuffixByteRequest
 from zarr.core.buffer import default_buffer_prototype
-from zarr.core.codec_pipeline import BatchedCodecPipeline
-from zarr.registry import register_pipeline
-from zarr.storage import LocalStore
 
 from rubhpc.errors import StoreError
+from rubhpc.input.array_files import ArrayFiles
 from rubhpc.storage import layout
 from rubhpc.storage.block_files import ABSENT, BlockFiles, encode_index
 from rubhpc.storage.manifest import Manifest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from zarr.abc.store import ByteRequest
-    from zarr.core.buffer import Buffer, BufferPrototype, NDBuffer
+    from zarr.core.buffer import Buffer, BufferPrototype
 
     from rubhpc.schema import Variable
 
 _ADDRESS = 40  # bits: what lies at a position of a shard with waiting blocks begins at (position + 1) << 40
 
 
-class CheckedPipeline(BatchedCodecPipeline):
-    """Reads chunks as zarr does, and reports a damaged one as a StoreError."""
-
-    async def read(self, batch_info: Iterable[Any], out: NDBuffer, drop_axes: tuple[int, ...] = ()) -> None:
-        """Read and decode chunks into `out`.
-
-        Raises
-        ------
-        StoreError
-            A chunk is damaged.
-        """
-        batch = list(batch_info)
-        try:
-            await super().read(batch, out, drop_axes)
-        except (ValueError, RuntimeError, TypeError, ArithmeticError) as error:  # of zarr and its codecs
-            where = str(batch[0][0]).removeprefix("file://") if len(batch) == 1 else "a chunk"
-            reason = " ".join(str(error).split())
-            raise StoreError(f"{where}: is damaged ({reason}); rubhpc verify names its cases") from error
-
-
-register_pipeline(CheckedPipeline)
-CHECKED = {"codec_pipeline.path": f"{CheckedPipeline.__module__}.{CheckedPipeline.__qualname__}"}
-
-
-class RegularFiles(LocalStore):
-    """A directory for zarr; a pipe in it is not waited for, and a device is not read.
+class RegularFiles(ArrayFiles):
+    """The files of a store for zarr (`rubhpc.input.array_files`), with waiting blocks in their shards.
 
     Of a shard for which blocks are waiting, zarr is given an index of addresses that stand for positions:
     each chunk is then read from where it is at that moment.
     """
 
     def __init__(self, root: Any, *, read_only: bool = True) -> None:
-        super().__init__(Path(root), read_only=read_only)
+        super().__init__(root, read_only=read_only)
         self._blocks: BlockFiles | None = None
         self._variables: dict[str, Variable] = {}
         try:
@@ -102,15 +72,6 @@ class RegularFiles(LocalStore):
                 data = await asyncio.to_thread(self._shard, self._variables[name], place, byte_range)
                 prototype = prototype or default_buffer_prototype()
                 return None if data is None else prototype.buffer.from_bytes(data)
-        path = self.root / key
-        try:
-            is_regular = stat.S_ISREG(path.stat().st_mode)
-        except (FileNotFoundError, NotADirectoryError):
-            return None
-        except OSError as error:
-            raise StoreError(f"{path}: cannot be read ({error.strerror}); see rubhpc verify") from error
-        if not is_regular:
-            raise StoreError(f"{path}: is not a regular file; rubhpc verify names what is damaged")
         return await super().get(key, prototype, byte_range)
 
     def _shard(self, variable: Variable, key: str, byte_range: ByteRequest | None) -> bytes | None:

@@ -98,7 +98,7 @@ def _last_written(store: Path) -> dict[int, float]:
 def _processor() -> str:
     """Name of the processor; of an unknown one, its kind."""
     try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
         lines = []
     names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]

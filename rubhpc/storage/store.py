@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 import os
 import shutil
-import socket
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -24,7 +23,7 @@ from rubhpc.schema import DIVERGED, DONE, MISSING
 from rubhpc.storage import layout
 from rubhpc.storage.block_files import BlockFiles
 from rubhpc.storage.disk import disk_errors, read_regular, write_whole
-from rubhpc.storage.drafts import remove_drafts
+from rubhpc.storage.drafts import draft_of, remove_drafts
 from rubhpc.storage.journal import Entry, Journal
 from rubhpc.storage.ledger import Ledger, replay
 from rubhpc.storage.lock import Lock
@@ -68,11 +67,12 @@ class Store:
         with disk_errors(path):
             path.parent.mkdir(parents=True, exist_ok=True)
             place = Path(os.path.realpath(path))  # "." has no name
-            draft = place.with_name(f".{place.name}.{socket.gethostname()}.{os.getpid()}.draft")
+            draft = draft_of(place)
             remove_drafts(place)
             draft.mkdir()
             try:
-                layout.build(draft, grid)
+                with disk_errors(path):  # while all of it is there, a disk that is full shows of what
+                    layout.build(draft, grid)
                 draft.rename(place)
             except (FileExistsError, NotADirectoryError):
                 raise StoreError(no_store(path, ELSEWHERE)) from None

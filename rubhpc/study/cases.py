@@ -23,7 +23,7 @@ from rubhpc.study.final_states import check_start, count_state
 from rubhpc.study.identity import identity_parts
 from rubhpc.study.operating_points import operating_points_of
 from rubhpc.study.point_checks import check_gap, check_points
-from rubhpc.study.points import Points, boxed
+from rubhpc.study.points import MOST_CASES, Points, boxed
 from rubhpc.study.predicted_steps import predicted_steps
 from rubhpc.study.warnings import warnings_of
 
@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from rubhpc.study.speed_law import SpeedLaw
     from rubhpc.study.study import Study
 
-MOST_CASES = 10_000_000  # a larger grid is refused as a mistake: it would fill the memory
 _BLOCK = 16  # cases of a block by default, at most
 
 

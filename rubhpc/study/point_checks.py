@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rubhpc.errors import InputError
-from rubhpc.fem.constraints import find_rigid_body_mode
+from rubhpc.fem.constraints import find_rigid_body_mode, unheld_message
 from rubhpc.fem.response import check_response_node
 from rubhpc.study.initial import KNOCKED
 from rubhpc.units import typed_quantity
@@ -58,11 +58,7 @@ def _check_held(points: OperatingPoints) -> None:
     """Refuse the modal scheme for a body that nothing holds: it has no constant response."""
     for index in points.along(points.response_axes) if points.has_few_rigs else ():
         if free := find_rigid_body_mode(points.model(index)):
-            where = points.named(points.response_axes, index)
-            problem = f"modal needs constrained bodies, and {free}{f' at {where}' if where else ''}"
-            # Friction turns a free rotor back for ever: it has no steady twist.
-            hold = "give it a stiffness, however soft" if "torsion" in free else "hold it"
-            raise InputError(f'[integrator] method: {problem}; {hold}, or set method = "central-difference"')
+            raise InputError(unheld_message(free, points.named(points.response_axes, index)))
 
 
 def _check_knocks(points: OperatingPoints) -> None:

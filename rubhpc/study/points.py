@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Protocol
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
+MOST_CASES = 10_000_000  # a larger grid is refused as a mistake: it would fill the memory
 Index = tuple[int, ...]
 Values = tuple[float, ...]
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rubhpc.errors import InputError
+from rubhpc.errors import InputError, StoreError
 from rubhpc.fem.assemble import assemble
 from rubhpc.input.messages import brief
 from rubhpc.input.quantity import parse_quantity
@@ -59,17 +59,24 @@ def read_state(path: str, select: Selection) -> StoredState:
     InputError
         There is no such store or case, it keeps no final states, or the case is not done.
     """
-    import zarr
-
     where = f"[initial] from: {path}"
     if not Path(path).exists():
         problem = f'{brief(path)} is not available; choose one of "rest", "contact_free"'
         raise InputError(f"[initial] from: {problem}, or the path of a store")
     try:
-        group = zarr.open_group(path, mode="r")
-        rig: Any = group.attrs["rig"]
-    except (OSError, KeyError, ValueError, TypeError):
+        return _read_state(path, select, where)
+    except (StoreError, OSError, LookupError, ValueError, TypeError, AttributeError):
         raise InputError(f"{where}: is not a store of a study; give the path of one") from None
+
+
+def _read_state(path: str, select: Selection, where: str) -> StoredState:
+    import zarr
+
+    from rubhpc.input.array_files import CHECKED, ArrayFiles
+
+    with zarr.config.set(CHECKED):
+        group = zarr.open_group(ArrayFiles(path), mode="r", zarr_format=3)
+    rig: Any = group.attrs["rig"]
     if FINAL_STATE not in group:
         fix = 'run its study with [record] keep = ["state", ...]'
         raise InputError(f"{where}: keeps no final states; {fix}")

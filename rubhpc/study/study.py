@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rubhpc.errors import InputError
-from rubhpc.input.messages import brief, place
+from rubhpc.input.messages import brief, place, quoted
 from rubhpc.input.reading import build, plain, read_toml, refuse_unknown
 from rubhpc.rig.reading import read_rig
 from rubhpc.rig.stators import has_bent_stator
@@ -216,6 +216,11 @@ def read_study(
     source = Path(path)
     file = str(source)
     table = read_toml(source)
+    if "rotor" in table:
+        raise InputError(
+            f"{place(file)}: is a rig, not a study; name it in a study, rig = {quoted([source.name])}, "
+            f"or see rubhpc modes {source.name}"
+        )
     refuse_unknown(table, dict.fromkeys(_TABLES), file, "")
     title = line_of_text(table, "title", source.stem, file)
     store = output if output is not None else line_of_text(table, "output", f"{source.stem}.zarr", file)

@@ -27,7 +27,7 @@ from rubhpc.integrate.marches import friction as friction_march
 from rubhpc.integrate.periodic_motions.proof import Solver
 from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import with_keys
-from rubhpc.schema import REGIME
+from rubhpc.schema import DONE, REGIME
 from rubhpc.study.study import Contact, Integrator, Recording
 from rubhpc.threads import on_one_thread
 
@@ -176,7 +176,7 @@ def settling() -> None:
         return found
 
     follow, truth = Solver.later, judged(3000)
-    for name, later in (("not followed", lambda solver, looks_periodic: iter(())), ("followed", follow)):
+    for name, later in (("not followed", lambda *_: iter(())), ("followed", follow)):
         Solver.later = later  # type: ignore[method-assign]
         pairs = list(zip(judged(120), truth, strict=True))
         regimes = Counter((REGIME[a[0]], REGIME[b[0]]) for a, b in pairs if a[0] != b[0])
@@ -190,6 +190,46 @@ def settling() -> None:
         print(f"{name}: other regime {sum(regimes.values())} {dict(regimes)}, other period {periods}")
         print(f"    settled and another peak {len(off)}, not settled {unsettled}")
     Solver.later = follow  # type: ignore[method-assign]
+
+
+def lasting() -> None:
+    """Chaos that has settled beside the same after 20 000 revolutions (theory, records: lasting chaos)."""
+    chaotic = REGIME.index("chaotic")
+    overhung = replace(
+        PACKAGED.rotor,
+        bearing=(PACKAGED.rotor.bearing[0], replace(PACKAGED.rotor.bearing[1], node=9)),
+        disc=(replace(PACKAGED.rotor.disc[0], node=13),),
+        unbalance=(replace(PACKAGED.rotor.unbalance[0], node=13),),
+    )
+    for name, count, n_case in (("one", 1, 360), ("two", 2, 120)):
+        said = wrong = lasts = found = 0
+        for seed in range(n_case):
+            random = np.random.default_rng([count, seed])
+            is_overhung = bool(seed % 2)
+            rotor, node = (overhung, 13) if is_overhung else (PACKAGED.rotor, 8)
+            rotor = replace(rotor, gravity=9.81 * (random.random() < 0.3))
+            stator = replace(PACKAGED.stator[0], node=node, youngs_modulus=10 ** random.uniform(9.3, 11))
+            turned = (replace(stator, angle=2.0 * math.pi * i / count) for i in range(count))
+            damping = 10 ** random.uniform(0.3, 1.1) if is_overhung else 31.7
+            case: dict[str, Any] = {
+                "rig": with_keys(
+                    replace(PACKAGED, rotor=rotor, stator=tuple(turned)), {"rotor.damping.alpha": damping}
+                ),
+                "speed_ratio": random.uniform(0.6, 4.0 if is_overhung else 6.0),
+                "clearance_ratio": random.uniform(0.4, 0.97),
+                "friction": random.uniform(0.05, 0.5),
+            } | (COULOMB if random.random() < 0.5 else {})
+            record = simulate(**case, keep=())
+            if record.status != DONE or not record.lyapunov_exponent > 0.0:
+                continue
+            later = simulate(**case, keep=(), transient=20_000, initial=record.final)
+            is_said = record.regime == chaotic and record.settled == 1
+            is_lasting = later.status == DONE and later.regime == chaotic
+            said, wrong = said + is_said, wrong + (is_said and not is_lasting)
+            lasts, found = lasts + is_lasting, found + (is_said and is_lasting)
+        print(
+            f"{name}, {n_case} cases: lasting chaos {lasts}, said {found}; said in all {said}, wrong {wrong}"
+        )
 
 
 def transients() -> None:
@@ -402,6 +442,7 @@ if __name__ == "__main__":
         rounding,
         short_records,
         settling,
+        lasting,
         transients,
         default_accuracy,
         accuracy_of_laws,

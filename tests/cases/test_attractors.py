@@ -8,7 +8,7 @@ import xarray as xr
 from motions_store import NO_CONTACT, PERIODIC, TORUS, store_of
 from scipy.stats import binom, binomtest
 
-from postproc.cases.attractors import attractors, start_axes
+from postproc.cases.attractors import NO_MOTION, attractors, start_axes
 from postproc.cases.basin_shares import basin_entropy, fractions, wilson
 from rubhpc.errors import InputError
 from rubhpc.schema import INFERRED
@@ -161,10 +161,32 @@ def test_entropy_of_known_pictures():
     share = np.array([13, 12]) / 25  # of a box of a checkerboard
     expected = -(share * np.log(share)).sum()
     assert basin_entropy(mixed, *over[::-1]) == pytest.approx((expected, expected))
-    halves = xr.DataArray(np.where(np.arange(20) < 10, 1, 2) * np.ones((20, 1), int), dims=over)
-    entropy, boundary = basin_entropy(halves, *over[::-1])
+    ends = np.array([1, 2, 3, 4]) / 5  # shares in the columns of boxes that a straight boundary divides
+    divided = -(ends * np.log(ends) + (1 - ends) * np.log(1 - ends))
+    for n, at in ((20, 10), (41, 30), (41, 13)):
+        halves = xr.DataArray(np.where(np.arange(n) < at, 1, 2) * np.ones((n, 1), int), dims=over)
+        found = basin_entropy(halves, *over[::-1])
+        assert found == pytest.approx((divided.sum() / (n - 4), divided.mean()))
+
+
+def test_entropy_of_one_motion_of_few_starts_and_of_starts_that_have_not_settled():
+    over = ("initial_horizontal", "initial_vertical")
+    one = xr.DataArray(np.ones((6, 7), int), dims=over)
+    entropy, boundary = basin_entropy(one, *over)
     assert entropy == 0.0
     assert np.isnan(boundary)
+    for without in (one * NO_MOTION, one[:4]):
+        assert np.isnan(basin_entropy(without, *over)).all()
+    checkered = xr.DataArray(np.indices((20, 20)).sum(axis=0) % 2 + 1, dims=over)
+    settled = checkered.where(np.arange(20)[:, np.newaxis] != 7, NO_MOTION)
+    assert np.isclose(basin_entropy(settled, *over), np.log(2.0), rtol=2e-3).all()
+
+
+def test_entropy_is_of_neighbours_in_any_order_of_the_starts():
+    values = np.random.default_rng(1).permutation(20) * 1e-4
+    over = {"initial_horizontal": values, "initial_vertical": np.arange(20.0)}
+    halves = xr.DataArray(np.where(values < 1e-3, 1, 2)[:, np.newaxis] * np.ones((1, 20), int), over)
+    assert basin_entropy(halves, *over) == basin_entropy(halves.sortby("initial_horizontal"), *over)
 
 
 def test_ten_thousand_starts_are_sorted_in_a_second_or_two():

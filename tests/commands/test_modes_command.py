@@ -81,6 +81,15 @@ def test_a_wall_has_no_table(tmp_path):
     assert lines[-1] == "Stator 2: a wall, which does not move"
 
 
+def test_a_rotor_that_floats_freely_is_warned_of(tmp_path):
+    text = (PACKAGED / "mokhtar2017.toml").read_text().replace("stiffness = 1e6", "stiffness = 0.0")
+    (tmp_path / "loose.toml").write_text(text)
+    assert "warning: the rotor floats freely: its bearings do not hold it" in run(
+        str(tmp_path / "loose.toml")
+    )
+    assert "floats" not in run("mokhtar2017")
+
+
 def test_no_damping_is_printed_as_zero_and_warned_of(tmp_path):
     rig = (PACKAGED / "mokhtar2017.toml").read_text().replace("beta = 1.98e-5", "beta = 0.0")
     (tmp_path / "undamped.toml").write_text(rig)

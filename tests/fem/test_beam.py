@@ -10,7 +10,7 @@ from rubhpc.fem.beam import (
     bar,
     bending,
     join,
-    rotor_element,
+    rotor_elements,
     shear_coefficient_circle,
     shear_coefficient_rectangle,
     stator_element,
@@ -71,6 +71,10 @@ def test_bar_carries_a_uniform_strain():
     assert np.array([0.0, 2.0]) @ mass @ [0.0, 2.0] == pytest.approx(3.0 * 2.0**3 / 3)
 
 
+def element_of(section):
+    return rotor_elements(section, [LENGTH])[0]
+
+
 def rigid_motion(name):
     """Degrees of a two-node element in a unit translation or rotation about its first node."""
     motion = np.zeros((2, 6))
@@ -82,7 +86,7 @@ def rigid_motion(name):
 
 @pytest.mark.parametrize("section", SECTIONS.values(), ids=SECTIONS)
 def test_rigid_body_has_its_inertia_and_no_force(section):
-    element = rotor_element(section)
+    element = element_of(section)
     outer, inner = section.outer_diameter / 2, section.inner_diameter / 2
     mass = section.density * math.pi * (outer**2 - inner**2) * LENGTH
     polar = mass * (outer**2 + inner**2) / 2
@@ -96,7 +100,7 @@ def test_rigid_body_has_its_inertia_and_no_force(section):
 
 @pytest.mark.parametrize("section", SECTIONS.values(), ids=SECTIONS)
 def test_gyroscopic_moment_is_spin_momentum_cross_tilt_rate(section):
-    element = rotor_element(section)
+    element = element_of(section)
     outer, inner = section.outer_diameter / 2, section.inner_diameter / 2
     polar = section.density * math.pi * (outer**2 - inner**2) * LENGTH * (outer**2 + inner**2) / 2
     rate = np.array([0.0, 0.7, -0.4])
@@ -111,7 +115,7 @@ def test_gyroscopic_moment_is_spin_momentum_cross_tilt_rate(section):
 
 @pytest.mark.parametrize("section", SECTIONS.values(), ids=SECTIONS)
 def test_matrices_do_not_change_when_the_axes_turn_about_the_shaft(section):
-    element = rotor_element(section)
+    element = element_of(section)
     angle = 0.6
     turn = np.eye(12)
     for first in (1, 4, 7, 10):
@@ -122,7 +126,7 @@ def test_matrices_do_not_change_when_the_axes_turn_about_the_shaft(section):
 
 
 def test_mass_and_stiffness_are_symmetric_and_gyroscopic_matrix_is_skew():
-    element = rotor_element(SECTIONS["hollow"])
+    element = element_of(SECTIONS["hollow"])
     assert np.array_equal(element.mass, element.mass.T)
     assert np.array_equal(element.stiffness, element.stiffness.T)
     assert np.array_equal(element.gyroscopic, -element.gyroscopic.T)
@@ -132,11 +136,11 @@ def test_mass_and_stiffness_are_symmetric_and_gyroscopic_matrix_is_skew():
 def test_sections_are_cut_into_equal_elements():
     whole = SECTIONS["solid"]
     cut = ShaftSection(length=2 * LENGTH, outer_diameter=0.05, elements=2, **STEEL)
-    assert rotor_element(cut).mass == pytest.approx(rotor_element(whole).mass)
+    assert element_of(cut).mass == pytest.approx(element_of(whole).mass)
 
 
 def test_joined_elements_share_their_node():
-    first, second = rotor_element(SECTIONS["solid"]), rotor_element(SECTIONS["hollow"])
+    first, second = element_of(SECTIONS["solid"]), element_of(SECTIONS["hollow"])
     joined = join([first, second])
     assert joined.mass.shape == (18, 18)
     shared = joined.stiffness[6:12, 6:12]

@@ -6,15 +6,19 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.linalg import eigvals
 from scipy.optimize import brentq
 from trial_rig import trial_rig
 
 from rubhpc import Rig, Unbalance, assemble, read_rig
 from rubhpc.fem.campbell import campbell, critical_speeds
 from rubhpc.fem.critical_speeds import find_critical_speeds
+from rubhpc.fem.linear_design import linear_design
 from rubhpc.rig.bearing_table import BearingTable
-from rubhpc.rig.parts import Bearing, Disc
+from rubhpc.rig.parts import Bearing, Disc, ShaftSection
+from rubhpc.rig.rotors import Rotor
 
+RPM = math.pi / 30
 PLANE = [(1, "v"), (1, "w")]
 TILT = [(1, "v"), (1, "w"), (1, "thy"), (1, "thz")]
 
@@ -149,3 +153,107 @@ def test_modes_that_do_not_oscillate_are_not_solved_for(monkeypatch):
     assert all(critical.mode.eigenvalue.imag > 0.0 for critical in found)
     assert len(found) == 2, "of twelve crossings"
     assert len(solved) <= 4
+
+
+def undamped_packaged():
+    rig = read_rig("mokhtar2017")
+    return replace(rig, rotor=replace(rig.rotor, damping=replace(rig.rotor.damping, alpha=0.0)))
+
+
+def nelson_mcvaugh(is_isotropic):
+    """The rotor of H. D. Nelson, J. M. McVaugh, J. Eng. Ind. 98 (1976) 593-600, without damping."""
+    ends = [0.0, 1.27, 5.08, 7.62, 8.89, 10.16, 10.67, 11.43, 12.7, 13.46, 16.51, 19.05, 22.86, 26.67, 28.7]
+    ends += [30.48, 31.5, 34.54, 35.5]  # cm
+    outer = [0.51, 1.02, 0.76, 2.03, 2.03, 3.3, 3.3, 2.54, 2.54, 1.27, 1.27, 1.52, 1.52, 1.27, 1.27, 3.81]
+    outer += [2.03, 2.03]
+    inner = {6: 1.52, 7: 1.78, 17: 1.52}
+    shaft = tuple(
+        ShaftSection(
+            length=(end - start) / 100,
+            outer_diameter=outer[i] / 50,
+            inner_diameter=inner.get(i, 0.0) / 50,
+            elements=1,
+            youngs_modulus=2.078e11,
+            shear_modulus=2.078e11 / 2.6,
+            density=7806.0,
+        )
+        for i, (start, end) in enumerate(pairwise(ends))
+    )
+    straight, cross = (4.378e7, 0.0) if is_isotropic else (3.503e7, -8.756e6)
+    bearings = [Bearing(node=n, kyy=straight, kzz=straight, kyz=cross, kzy=cross) for n in (11, 15)]
+    disc = Disc(node=5, mass=1.401, diametral_inertia=13.6e-4, polar_inertia=20e-4)
+    unbalance = Unbalance(node=5, mass=1.401, radius=1e-4)
+    rotor = Rotor(shaft=shaft, disc=(disc,), bearing=tuple(bearings), unbalance=(unbalance,))
+    return Rig(name="nelson mcvaugh", rotor=rotor)
+
+
+@pytest.mark.parametrize(
+    ("rig", "top"),
+    [
+        (undamped_packaged(), 48000 * RPM),
+        (nelson_mcvaugh(is_isotropic=True), 1e5 * RPM),
+        (nelson_mcvaugh(is_isotropic=False), 1e5 * RPM),
+    ],
+    ids=["packaged", "isotropic", "orthotropic"],
+)
+def test_critical_speeds_depend_neither_on_the_range_nor_on_its_grid(rig, top):
+    """Those of an undamped rotor are the eigenvalues of (K - w^2 (M - i G)) x = 0."""
+    model = assemble(rig)
+    body = model.rotor
+    rows = body.rows(["v", "w"])
+    K, M, G = (matrix[np.ix_(rows, rows)] for matrix in (body.stiffness, body.mass, body.gyroscopic))
+    flexible = eigvals(M - 1j * G, K).real
+    known = np.sort(flexible[flexible > 0.0] ** -0.5)
+    kinds = {}
+    for low, high, n in [(0.0, top, 2), (0.1 * top, 0.5 * top, 5)]:
+        found = find_critical_speeds(model, np.linspace(low, high, n))
+        assert [c.speed for c in found] == pytest.approx(known[(known > low) & (known < high)], rel=1e-9)
+        for c in found:
+            kind = c.mode.whirl, c.is_excited
+            assert kinds.setdefault(np.abs(known - c.speed).argmin(), kind) == kind
+
+
+@pytest.mark.parametrize("n_speed", [5, 13])
+def test_twins_at_standstill_part_into_backward_and_forward(n_speed):
+    design = linear_design(read_rig("mokhtar2017"), (0.0, 48000 * RPM), n_speed=n_speed)
+    assert design.critical_speed.values[:2] / RPM == pytest.approx([1893.41, 1893.74], abs=0.01)
+    assert design.critical_whirl.values[:2].tolist() == ["backward", "forward"]
+    assert design.is_excited.values[:2].tolist() == [False, True]
+    assert design.critical_mode.values[:7].tolist() == [1, 2, 4, 5, 6, 7, 8], "3 is torsion"
+    for mode, whirl in zip(design.critical_mode.values, design.critical_whirl.values, strict=True):
+        assert set(design.whirl.sel(mode=mode).values[1:].tolist()) == {whirl}
+
+
+def test_torsion_that_meets_the_spin_hides_no_critical_speed():
+    """Seals whose stiffness outruns the spin, while the spin passes the torsional frequency."""
+    rig = nelson_mcvaugh(is_isotropic=True)
+    speeds = [0.0, 20000 * RPM, 50000 * RPM, 100000 * RPM]
+    stiffness, cross = [1e6, 8e6, 6e7, 2.4e8], [0.0, 5e6, 1e7, 2e7]
+    seals = [
+        BearingTable(
+            node=bearing.node,
+            speed=speeds,
+            kyy=stiffness,
+            kzz=[0.8 * value for value in stiffness],
+            kyz=cross,
+            kzy=[-value for value in cross],
+            damping=[1e4, 2e3, 1e3, 5e2],
+        )
+        for bearing in rig.rotor.bearing
+    ]
+    model = assemble(replace(rig, rotor=replace(rig.rotor, bearing=tuple(seals))))
+    known = [102.2807, 112.8647, 831.4441, 1179.466]
+    for high, n in ((1900.0, 3), (3500.0, 5)):
+        found = [c.speed for c in find_critical_speeds(model, np.linspace(0.0, high, n))]
+        assert found[:4] == pytest.approx(known, rel=1e-6)
+
+
+def test_a_rotor_that_floats_freely_has_critical_speeds():
+    """Its rigid-body modes, eigenvalues of rounding, neither count nor take another mode's place."""
+    section = {"youngs_modulus": 2.1e11, "shear_modulus": 8e10, "density": 7800.0, "outer_diameter": 0.03}
+    disc = Disc(node=6, diameter=0.3, thickness=0.03, density=7800.0)
+    shaft, soft = ShaftSection(length=0.5, elements=5, **section), Bearing(node=1, stiffness=0.0)
+    model = assemble(Rig(name="floating", rotor=Rotor(shaft=(shaft,), disc=(disc,), bearing=(soft,))))
+    for n in (3, 11):
+        found = find_critical_speeds(model, np.linspace(0.0, 5000.0, n))
+        assert [c.speed for c in found] == pytest.approx([743.124361, 3362.413168, 3445.876886], rel=1e-8)

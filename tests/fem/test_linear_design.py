@@ -8,7 +8,7 @@ import pytest
 from trial_rig import trial_rig
 
 import rubhpc
-from rubhpc import InputError, Unbalance, assemble
+from rubhpc import InputError, Rig, Unbalance, assemble, read_rig
 from rubhpc.fem.assemble import model_at
 from rubhpc.fem.linear_design import linear_design
 from rubhpc.fem.modes import modes
@@ -126,3 +126,29 @@ def test_what_is_no_request_is_refused(given, message):
 
 def test_public_name():
     assert rubhpc.linear_design is linear_design
+
+
+def test_an_undamped_rotor_has_a_design():
+    """Its resonance is met by a speed of the range, and by the critical speed that is solved for."""
+    found = linear_design(
+        Rig.from_matrices(
+            2.0 * np.eye(2),
+            None,
+            2e4 * np.eye(2),
+            degrees=[(1, "v"), (1, "w")],
+            unbalance=[Unbalance(node=1, mass=1.0, radius=1e-5)],
+        ),
+        (0.0, 300.0),
+        n_speed=7,
+    )
+    assert found.critical_speed.values == pytest.approx([100.0, 100.0])
+    assert found.peak_speed.values == pytest.approx([100.0], rel=1e-7)
+    assert np.isfinite(found.major_axis.values).all()
+
+
+def test_backward_whirl_that_nothing_excites_has_no_peak():
+    given = read_rig("mokhtar2017")
+    rotor = replace(given.rotor, damping=replace(given.rotor.damping, alpha=0.0))
+    found = linear_design(replace(given, rotor=rotor), (0.0, 2400.0), n_speed=5)
+    excited = found.critical_speed.values[found.is_excited.values]
+    assert found.peak_speed.values == pytest.approx(excited, rel=1e-7)

@@ -77,6 +77,32 @@ def test_threshold_speed_of_a_seal():
     assert "\n" not in message
 
 
+@pytest.mark.parametrize("end", [1e-3, 1e-6, 1e-9])
+def test_threshold_speed_of_a_nearly_massless_shaft(end):
+    """A mass on a spring k, in series with k_b + c s - i q.
+
+    The threshold is at q = c w with w^2 = k k_b / (k + k_b) / m. The node between them, of the
+    mass `end`, decays by up to 2e11 1/s.
+    """
+    mass, spring, slope, damping = 2.0, 1e6, 400.0, 200.0
+    shaft = spring * np.kron([[1.0, -1.0], [-1.0, 1.0]], np.eye(2))
+    degrees = [(node, name) for node in (1, 2) for name in ("v", "w")]
+    rig = Rig.from_matrices(np.diag([mass, mass, end, end]), None, shaft, degrees=degrees)
+    table = BearingTable(
+        node=2,
+        speed=[0.0, 1000.0],
+        kyy=spring,
+        kzz=spring,
+        kyz=[0.0, 1000.0 * slope],
+        kzy=[0.0, -1000.0 * slope],
+        damping=damping,
+    )
+    body = assemble(replace(rig, rotor=replace(rig.rotor, bearing=(table,)))).rotor
+    known = damping / slope * math.sqrt(spring / 2 / mass)
+    found = threshold_speed(body, np.linspace(0.0, 1000.0, 12))
+    assert found == pytest.approx(known, rel=max(2e-6, end))
+
+
 def test_rotors_without_damping_or_free_to_turn_are_not_unstable():
     rig = read_rig("mokhtar2017")
     free = replace(rig.rotor.torsion, fixed_node=None, free=True)

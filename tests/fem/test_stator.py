@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
-from rubhpc.fem.beam import shear_coefficient_rectangle
+from rubhpc.fem.beam import shear_coefficient_circle, shear_coefficient_rectangle
 from rubhpc.fem.stator import assemble_stator
 from rubhpc.rig.parts import Damping, Disc
 from rubhpc.rig.reading import read_rig
@@ -35,6 +36,33 @@ def test_cantilever_yields_as_a_timoshenko_beam(elements):
     compliance = 0.05**3 / (3 * 3e9 * second_moment) + 0.05 / shear_rigidity
     assert tip_stiffness(model, model.axial) == pytest.approx(3e9 * area / 0.05)
     assert tip_stiffness(model, model.lateral) == pytest.approx(1 / compliance)
+
+
+def test_a_screw_yields_as_a_round_beam():
+    model = assemble_stator(replace(STATOR, width=None, height=None, diameter=0.006), 0.06)
+    area, second_moment = np.pi / 4 * 0.006**2, np.pi / 64 * 0.006**4
+    compliance = 0.05**3 / (3 * 3e9 * second_moment) + 0.05 / (
+        shear_coefficient_circle(0.3) * 3e9 / 2.6 * area
+    )
+    assert tip_stiffness(model, model.axial) == pytest.approx(3e9 * area / 0.05)
+    assert tip_stiffness(model, model.lateral) == pytest.approx(1 / compliance)
+    assert model.euler_load == pytest.approx(np.pi**2 * 3e9 * second_moment / (4 * 0.05**2))
+    body = model.body
+    ones = np.array([name == "axial" for _, name in body.degrees], float)
+    assert ones @ body.mass @ ones == pytest.approx(1200.0 * area * 0.05 * 8 / 9)  # 1/9 at the clamped node
+
+
+@pytest.mark.parametrize(
+    ("sides", "says"),
+    [
+        ({"height": None}, "height: missing; add height"),
+        ({"diameter": 0.006}, "width: conflicts with diameter"),
+        ({"width": None, "diameter": 0.006}, "height: conflicts with diameter"),
+    ],
+)
+def test_a_section_is_round_or_rectangular(sides, says):
+    with pytest.raises(InputError, match=says):
+        replace(STATOR, **sides)
 
 
 def test_rows_of_the_tip_are_of_its_free_end():

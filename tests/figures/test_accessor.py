@@ -8,6 +8,7 @@ import subprocess
 import sys
 from typing import TYPE_CHECKING
 
+import figure_stub
 import matplotlib
 import pytest
 import synthetic_store
@@ -88,7 +89,7 @@ def test_every_figure_is_a_method_with_its_signature_and_docstring(store: xr.Dat
 def test_a_figure_has_its_options_by_name_in_help() -> None:
     text = " ".join(pydoc.render_doc(Rub.spectrum, renderer=pydoc.plaintext).split())
     text = text.replace("( ", "(")  # from Python 3.13 on a long signature has a line for each parameter
-    assert "spectrum(self, /, signal: str = 'torsion', *, full: bool = False, orders: bool" in text
+    assert "spectrum(self, /, signal: str | None = None, *, full: bool = False, probes: tuple[" in text
     assert "lines: int = 6, log: bool = False" in text
 
 
@@ -111,7 +112,7 @@ def test_as_many_axes_are_asked_for_as_a_figure_has(store: xr.Dataset) -> None:
     ("name", "args", "message"),
     [
         ("cascade", {"form": "water"}, 'form: "water" is not one of waterfall, intensity'),
-        ("cascade", {"max_frequency": -5.0, **REST}, "out of range"),
+        ("cascade", {"max": -5.0, **REST}, "out of range"),
         ("bifurcation", {"color": "red"}, 'color: "red" is not one of regime, period'),
         ("hht", {"contact": "none", **ONE}, "contact: "),
         ("orbit", {"revolutions": 0, **ONE}, "revolutions: 0 is out of range; it must be at least 1"),
@@ -162,3 +163,7 @@ def test_what_run_up_returns_has_figures_though_no_store_was_opened() -> None:
     script = "import rubhpc, xarray; rubhpc.run_up; print(hasattr(xarray.Dataset, 'rub'))"
     found = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
     assert found.stdout.strip() == "True"
+
+
+def test_type_checkers_see_every_figure_as_it_is_declared():
+    assert figure_stub.STUB.read_text() == figure_stub.text()

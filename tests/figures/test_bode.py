@@ -124,6 +124,23 @@ def test_a_bode_plot_names_the_peaks_of_1x():
     assert not bode(data.assign_coords(speed=speed), order=2.0).show()[0].texts
 
 
+@pytest.mark.parametrize(("touched", "words"), [(100.0, "955 rpm, rub"), (140.0, "955 rpm, AF 9.93")])
+def test_a_peak_within_which_the_rotor_rubs_has_no_amplification_factor(touched, words):
+    speed = np.linspace(50.0, 150.0, 101)
+    response = 1e-5 / (1.0 - (speed / 100.0) ** 2 + 0.1j * speed / 100.0)
+    angle = 2 * math.pi * np.arange(6 * N) / N
+    signal = (response[:, None] * np.exp(1j * angle)).real
+    data = study().isel(friction=0, speed=[0] * 101, drop=True).assign(vertical=(("speed", "sample"), signal))
+    share = np.stack([0.2 * (speed == touched), 0.0 * speed])  # of two stators
+    data = data.assign(
+        vertical=data["vertical"].assign_attrs(units="m"),
+        contact_fraction=(("stator", "speed"), share),
+        spin_speed=("speed", speed, {"units": "rad s-1"}),
+    )
+    axes = bode(data.assign_coords(speed=speed)).show()
+    assert [text.get_text() for text in axes[0].texts] == [words]
+
+
 def test_stretches_of_a_lag_lie_by_the_curve_drawn_before():
     """Whole turns are unknown across a gap; a coast-down is drawn as the run-up that it repeats."""
     speed = np.linspace(100.0, 200.0, 11)

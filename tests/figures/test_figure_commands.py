@@ -121,8 +121,8 @@ def test_data_come_as_arrays(run, synthetic_path, name):
         ("orbit", [*ONE, "--data", "orbit.xls"], "unknown format; choose one of"),
         ("waveform", [*ONE, "--signal", "twist"], "twist: no such signal"),
         ("cascade", [*options(CLEARANCE, FRICTION, MODULUS), "--order-lines", "1/0"], "not a list of orders"),
-        ("cascade", [*options(CLEARANCE, FRICTION, MODULUS), "--max-frequency", "1 kg"], "--max-frequency"),
-        ("cascade", [*options(CLEARANCE, FRICTION, MODULUS), "--max-frequency", "-5"], "out of range"),
+        ("cascade", [*options(CLEARANCE, FRICTION, MODULUS), "--max", "1 kg"], "--max"),
+        ("cascade", [*options(CLEARANCE, FRICTION, MODULUS), "--max", "-5"], "out of range"),
         ("map", ["--value", "vertical"], "not a measure of a case"),
     ],
 )

@@ -5,6 +5,7 @@ import pytest
 import synthetic_store
 import xarray as xr
 from matplotlib.colors import to_rgba
+from matplotlib.markers import TICKDOWN, TICKRIGHT
 
 from postproc.cases.maps import default_axes, map_data
 from postproc.figures.cells import cell_edges, hatch_cells, outline_cells
@@ -362,7 +363,38 @@ def test_velocities_need_waveforms_and_are_no_signals(case, ax):
 def test_an_orbit_names_what_it_marks(case):
     figure = orbit(case).show().figure
     names = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert set(names) == {"once a revolution", "first sample", "clearance", "stator"}
+    marked = {"once a revolution", "first sample", "clearance", "stator", "centre without loads"}
+    assert set(names) == marked
+    assert "rotation" in [text.get_text() for text in figure.axes[0].texts]
+
+
+@pytest.fixture
+def sagging(case):
+    """An orbit of 50 um about a sag of 1 mm, in a clearance of 1.2 mm."""
+    turn = np.linspace(0.0, 2 * np.pi, case.sizes["sample"], endpoint=False)
+    units = {"units": "m"}
+    return case.assign(
+        vertical=("sample", -1e-3 + 50e-6 * np.cos(turn), units),
+        horizontal=("sample", 50e-6 * np.sin(turn), units),
+        clearance=((), 1.2e-3, units),
+    )
+
+
+def test_the_view_follows_an_orbit_that_sags_in_a_large_clearance(sagging, ax):
+    draw_orbit(orbit_data(sagging), ax)
+    assert ax.get_ylim()[1] == pytest.approx(-0.95 * 1e3, abs=20)
+    assert ax.get_ylim()[0] < -1200 < ax.get_ylim()[0] + 50  # with the clearance below, which is near
+    assert ax.get_title(loc="left") == "mean -1000 µm vertical, 0 µm horizontal"
+    labels = ax.get_legend_handles_labels()[1]
+    assert "clearance" in labels
+    assert "centre without loads" not in labels
+
+
+@pytest.mark.parametrize(("frame", "low", "high"), [("clearance", -1380, 1380), ("mean", -260, 60)])
+def test_all_of_the_clearance_or_the_motion_about_its_mean_is_drawn(sagging, ax, frame, low, high):
+    draw_orbit(orbit_data(sagging), ax, frame)
+    assert ax.get_ylim() == pytest.approx((low, high), abs=40)
+    assert ("mean" in ax.get_ylabel()) == (frame == "mean")
 
 
 def test_what_had_not_settled_is_hatched(store, ax):
@@ -402,8 +434,12 @@ def test_a_line_surrounds_what_is_out_of_range_where_that_is_most(plain_map, ax)
 def test_an_outline_is_the_edge_of_its_cells(ax):
     edges = np.arange(4.0), np.arange(3.0)
     mask = np.array([[True, True, False], [False, True, False]])
-    (lines,) = outline_cells(ax, edges, mask, "beyond")
-    segments = np.array(lines.get_segments())
+    (named,) = outline_cells(ax, edges, mask, "beyond")
+    assert named.get_label() == "beyond"
+    segments = np.array(ax.collections[0].get_segments())
     assert np.ptp(segments, axis=1).sum() == pytest.approx(8.0)  # of three cells in an L
     assert not np.isclose(segments.mean(axis=1), [1.0, 0.5]).all(axis=1).any()  # between two of them
     assert outline_cells(ax, edges, np.zeros((2, 3), bool), "none") == []
+    ticks = {line.get_marker(): np.column_stack(line.get_data()).tolist() for line in ax.lines}
+    assert ticks[TICKRIGHT] == [[0.0, 0.5], [1.0, 1.5]]  # on the side of the cells
+    assert ticks[TICKDOWN] == [[0.5, 1.0], [1.5, 2.0]]

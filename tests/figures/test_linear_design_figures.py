@@ -29,6 +29,7 @@ def test_response_shows_amplitude_phase_and_the_operating_range(design, tmp_path
     assert phase.get_ylabel().startswith("Phase lag")
     assert phase.yaxis_inverted()
     assert 90.0 < lag[-1] - lag[1] < 180.0, "past the resonance it falls behind"
+    assert "operating speeds" in [text.get_text() for text in amplitude.get_legend().get_texts()]
     named = [text.get_text() for text in amplitude.texts]
     speed, factor = float(design.peak_speed[0]), float(design.amplification_factor[0])
     assert f"{30 / np.pi * speed:.0f}\nAF {factor:.3g}" in named
@@ -56,6 +57,7 @@ def test_shapes_have_a_panel_each_and_unit_size(design, tmp_path):
         size = np.hypot(ax.lines[1].get_ydata(), ax.lines[2].get_ydata())
         assert size.max() == pytest.approx(1.0, abs=1e-9)
         assert ax.lines[1].get_xdata() == pytest.approx(np.linspace(0.0, 0.6, 5))
+        assert ax.lines[3].get_xdata() == pytest.approx([0.0, 0.6])  # bearings
     assert drawing.save(tmp_path / "shapes.png").stat().st_size > 10_000
 
 

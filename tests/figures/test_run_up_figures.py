@@ -13,6 +13,7 @@ from postproc.figures.bode import bode
 from postproc.figures.centreline import centreline
 from postproc.figures.polar import polar
 from postproc.figures.run_up_marks import critical_speeds, name_speeds
+from postproc.figures.spectrum import spectrum
 from postproc.figures.speed import speed
 from postproc.figures.waterfall import waterfall
 from postproc.signals.run_up_spectra import mean_positions, run_up_spectra
@@ -79,6 +80,31 @@ def test_a_waterfall_stacks_them_at_their_speeds():
     assert high > 150 * 30 / math.pi - 60
     colours = waterfall(run_up(), form="spectrogram", window=8, orders=True).show()
     assert colours.get_ylim() == (0.0, 4.0)
+
+
+def whirling():
+    """1X forward of 2 um and 1X backward of 1 um at both probes' node, nothing at the disc."""
+    passed = run_up()
+    turn = 2 * math.pi * passed["turned"].values
+    whirl = 2e-6 * np.exp(1j * turn) + 1e-6 * np.exp(-1j * turn)  # vertical and i horizontal
+    ways = ("probe_left", -math.pi / 4), ("probe_right", math.pi / 4)
+    return passed.assign({p: ("sample", (whirl * np.exp(-1j * at)).real, {"units": "m"}) for p, at in ways})
+
+
+def test_full_spectra_of_a_run_up_separate_forward_from_backward_whirl_of_two_probes():
+    pair = {"full": True, "probes": ("left", "right")}
+    ax = waterfall(whirling(), **pair, window=8, count=5, max=3, orders=True).show()
+    assert ax.get_xlim() == (-3.0, 3.0)
+    assert {"forward", "backward"} <= {text.get_text() for text in ax.texts}
+    drawing = spectrum(whirling(), **pair, at=100.0)
+    line = drawing.shown["whirl"]
+    assert float(line.sel(order=1.0)) == pytest.approx(2e-6, rel=1e-6)
+    assert float(line.sel(order=-1.0)) == pytest.approx(1e-6, rel=1e-6)
+    assert float(line["speed"]) == pytest.approx(100.0, rel=0.05)
+    with pytest.raises(InputError, match="add --full"):
+        waterfall(whirling(), probes=("left", "right"))
+    with pytest.raises(InputError, match=r"at: 4774\.65 rpm is none of its speeds"):
+        spectrum(whirling(), full=True, at=500.0)
 
 
 def test_a_waterfall_of_a_speed_that_rises_and_falls_is_drawn_over_revolutions():

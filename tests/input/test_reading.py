@@ -147,3 +147,17 @@ def test_what_is_no_file_is_refused(tmp_path):
         (tmp_path / "a.toml").touch()
         with pytest.raises(InputError, match=r"\A.*(no such file|not a file|cannot be read).*; .+\Z"):
             read_toml(path)
+
+
+@pytest.mark.parametrize("text", ["a{} = 1", "[a{}]", "x = {{ a{} = 1 }}", '"a"{} = 1'])
+def test_a_key_of_many_parts_is_refused_before_it_is_parsed(tmp_path, text):
+    part = '."a"' if '"' in text else " . a"
+    (tmp_path / "long.toml").write_text("# a comment\n" + text.format(part * 20_000))
+    with pytest.raises(InputError, match="line 2: a key of over 32 parts"):
+        read_toml(tmp_path / "long.toml")
+
+
+def test_texts_and_comments_may_hold_dots(tmp_path):
+    dots = "a.b" * 40
+    (tmp_path / "dots.toml").write_text(f'title = "{dots}" # {dots}')
+    assert read_toml(tmp_path / "dots.toml") == {"title": dots}

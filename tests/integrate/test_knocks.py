@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
 from running import environment, write_knocks
 
@@ -168,14 +169,13 @@ from pathlib import Path
 from rubhpc.knocks import least_knock
 from rubhpc.study.study import read_study
 
-if __name__ == "__main__":
-    study = read_study(Path(sys.argv[1]))
-    least_knock(study, angles=1, workers=2, report=lambda n, _: print(n, flush=True))
+study = read_study(Path(sys.argv[1]))
+least_knock(study, angles=1, workers=2, report=lambda n, _: print(n, flush=True))
 """
 
 
-def test_sigterm_ends_all_processes_without_a_word_of_theirs(tmp_path):
-    """The resource tracker warned of semaphores that the killed search had left."""
+@pytest.mark.parametrize("number", [signal.SIGKILL, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
+def test_processes_end_with_the_first(tmp_path, number):
     study = write_knocks(tmp_path, "{ start = 1.05, stop = 1.25, num = 30 }")
     (tmp_path / "search.py").write_text(SEARCH)
     asked = [sys.executable, str(tmp_path / "search.py"), str(study)]
@@ -185,9 +185,12 @@ def test_sigterm_ends_all_processes_without_a_word_of_theirs(tmp_path):
         assert process.stdout is not None
         while int(process.stdout.readline()) < 1:
             pass
-        process.terminate()
+        others = psutil.Process(process.pid).children()
+        process.send_signal(number)
         _, err = process.communicate(timeout=60)
-    assert (process.returncode, err) == (128 + signal.SIGTERM, "")
+    assert others
+    assert not psutil.wait_procs(others, timeout=20)[1]
+    assert (process.returncode, err) == (-number, "")
 
 
 def test_what_cannot_be_is_refused(tmp_path):
@@ -199,7 +202,7 @@ def test_what_cannot_be_is_refused(tmp_path):
         least_knock(followed)
     with pytest.raises(InputError, match="99 does not move sideways"):
         least_knock(study_of(tmp_path), nodes=[99])
-    with pytest.raises(InputError, match="workers 0"):
+    with pytest.raises(InputError, match="workers: 0 is out of range"):
         least_knock(study_of(tmp_path), workers=0)
     with pytest.raises(InputError, match="give numbers above 0"):
         least_knock(study_of(tmp_path), angles=0)

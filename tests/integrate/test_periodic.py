@@ -48,6 +48,46 @@ def test_two_motions_of_one_case():
     assert simulate("mokhtar2017", **BITES, initial=once.state, transient=20, revolutions=4).period == 1
 
 
+SOFT = {"law": "penalty", "stiffness": "5 MN/m"}
+LAWS = {
+    "sliding": {},
+    "coulomb": {"friction_law": "coulomb"},
+    "restitution": {"restitution": 0.5},
+    "penalty": SOFT,
+    "damped penalty": SOFT | {"damping": "20 N*s/m"},
+    "penalty and coulomb": SOFT | {"friction_law": "coulomb"},
+}
+RUBS = {"speed_ratio": 1.1, "friction": 0.1, "overrides": {"stator.youngs_modulus": "30 GPa"}, "keep": ()}
+
+
+def assert_ends_where_it_starts(state, record):
+    for end, start in (
+        (record.final.displacement, state.displacement),
+        (record.final.velocity, state.velocity),
+        (record.final.contact_force, state.contact_force),
+    ):
+        assert end == pytest.approx(start, abs=1e-6 * max(np.abs(start).max(), 1e-6))
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_record_ends_where_it_starts(law):
+    """Under the penalty in contact, which is closed at the angle 0."""
+    motion = rubhpc.periodic("mokhtar2017", **RUBS, clearance="100 um", **LAWS[law])
+    assert_ends_where_it_starts(motion.state, motion.record)
+    assert bool(motion.state.contact_force.any()) == ("penalty" in law)
+    if law == "penalty":
+        assert motion.record.peak_contact_force == pytest.approx([155.74], abs=0.01)
+
+
+def test_records_of_a_branch_end_where_they_start():
+    (found,) = rubhpc.branch(
+        "mokhtar2017", **RUBS, along="clearance", start="100 um", stop="98 um", largest_step="2 um", **SOFT
+    )
+    for i, point in enumerate(found.points):
+        assert point.state.contact_force.any()
+        assert_ends_where_it_starts(point.state, found.record(i))
+
+
 def test_motion_beside_it_draws_near_by_the_largest_multiplier():
     """From beside the solution along its first direction, over a few periods."""
     case = {"speed_ratio": 1.32, "keep": ()} | JUMP

@@ -265,6 +265,13 @@ def test_shorter_kernel_calls_change_nothing(monkeypatch):
     assert same(usual, pieces)
 
 
+def test_a_case_says_where_it_is():
+    said = []
+    run(check=lambda: None, say=said.append)
+    assert said[0] == "a case at revolution -1, its record begins at 0"
+    assert said[-1] == "a case at revolution 0 of its record"
+
+
 def test_check_may_drop_the_case():
     class StopError(Exception):
         pass

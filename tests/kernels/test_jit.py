@@ -269,3 +269,11 @@ def test_short_loops_take_one_vector_at_a_time():
 
     assert vectors(add_few) == vectors(call_add_few) == 2  # one of each array
     assert vectors(add) > 2
+
+
+def test_cases_run_without_compilation():
+    case = "speed_ratio=1.2, clearance='100 um', friction=0.1, revolutions=1, transient=1"
+    script = f"import rubhpc; print(rubhpc.simulate('mokhtar2017', {case}, samples_per_revolution=16).status)"
+    environ = environment() | {"NUMBA_DISABLE_JIT": "1"}
+    said = subprocess.run([sys.executable, "-c", script], env=environ, capture_output=True, text=True)
+    assert said.stdout == "1\n", said.stderr

@@ -8,8 +8,8 @@ import pytest
 from running import each_launcher, run, start, write_knocks
 
 from rubhpc.errors import InputError
-from rubhpc.knock_cases import LeastKnock, Progress
-from rubhpc.knocks import least_knock, search_of
+from rubhpc.knock_cases import LeastKnock, Progress, search_of
+from rubhpc.knocks import least_knock
 from rubhpc.running.knocks_on_ranks import least_knock_on
 from rubhpc.running.pool import Alone
 from rubhpc.study.study import read_study

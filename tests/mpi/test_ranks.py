@@ -9,6 +9,7 @@ from pathlib import Path
 import psutil
 import pytest
 from running import (
+    complaint,
     each_launcher,
     journalled_cases,
     processes_of,
@@ -118,15 +119,29 @@ def test_an_input_error_is_reported_once(tmp_path):
     assert done.stderr.count("nowhere.toml: no such file") == 1
 
 
-def test_a_rank_that_slips_ends_the_job(tmp_path):
+@pytest.mark.parametrize(("mode", "what"), [("rank1", "LookupError: a slip"), ("exit1", "SystemExit")])
+def test_a_rank_that_slips_ends_the_job(tmp_path, mode, what):
     began = time.monotonic()
-    done = run("rank1", write_slow_study(tmp_path, transient=2000), ranks=2, script=POISONED, timeout=60)
+    done = run(mode, write_slow_study(tmp_path, transient=2000), ranks=2, script=POISONED, timeout=60)
     assert done.returncode == 70
     assert time.monotonic() - began < 30  # the study itself takes minutes
-    assert "rubhpc: rank 1: LookupError: a slip; the traceback is in " in done.stderr
+    assert complaint(done.stderr).startswith(f"rubhpc: rank 1: {what}; the traceback is in ")
     assert "Traceback" not in done.stderr
     (log,) = (tmp_path / "tiny.zarr" / ".rubhpc" / "logs").iterdir()
-    assert "a slip" in log.read_text()
+    assert what in log.read_text()
+
+
+INTERRUPTED = "def build():\n    raise KeyboardInterrupt\n"
+
+
+@each_launcher
+def test_an_interrupt_within_a_rig_ends_all_ranks(tmp_path, launcher):
+    (tmp_path / "rig.py").write_text(INTERRUPTED)
+    study = write_study(tmp_path)
+    study.write_text(study.read_text().replace("mokhtar2017", "rig.py:build"))
+    done = run(study, "--trust-rig", ranks=2, launcher=launcher, timeout=60)
+    assert done.returncode == 75
+    assert complaint(done.stderr) == "rubhpc: interrupted; run the same command again"
 
 
 def kill_rank(rank: int, store: Path) -> None:

@@ -62,6 +62,12 @@ def test_variables_are_those_of_the_schema() -> None:
     assert all(f"| `{name}` |" in text for name in VARIABLES)
 
 
+@pytest.mark.parametrize("page", sorted((DOCS / "reference").glob("*.md")), ids=lambda page: page.stem)
+def test_pages_in_the_repository_are_as_generated(page: Path) -> None:
+    text = page.read_text()
+    assert tables.refreshed(text) == text, "run python docs/site/reference_tables.py"
+
+
 def test_public_names_are_documented() -> None:
     text = tables.python_names()
     assert all(f":: rubhpc.{name}\n" in text for name in rubhpc.__all__)

@@ -22,6 +22,7 @@ from postproc.report.budget import write_report
 from postproc.report.cases import Cases
 from postproc.report.grid import Measures, described_axes
 from postproc.report.page import Page, least_size
+from postproc.store.attributes import table_of
 from postproc.store.open import open_store
 from rubhpc.commands.report import report
 from rubhpc.errors import InputError
@@ -142,7 +143,7 @@ def test_validity_counts_what_is_out_of_range(two_stator_path: Path) -> None:
 
 def test_slip_may_reverse_under_coulombs_law(two_stator_path: Path) -> None:
     dataset = open_store(two_stator_path)
-    study = {**dataset.attrs["study"], "contact": {"friction_law": "coulomb"}}
+    study = {**table_of(dataset, "study"), "contact": {"friction_law": "coulomb"}}
     text = Page(dataset.assign_attrs(study=study)).html(values={})
     assert "Contact force over Euler load" in text
     assert "contradicts steady sliding" not in text

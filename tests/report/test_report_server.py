@@ -89,6 +89,49 @@ def test_only_this_machine_is_answered(server: Server) -> None:
     assert ask(server, "/", Host=f"localhost:{server.port}")[0] == 200
 
 
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"Origin": "http://evil.example"},
+        {"Origin": "null"},
+        {"Sec-Fetch-Site": "cross-site"},
+        {"Sec-Fetch-Site": "same-site"},  # another port of this machine
+        {"Host": "127.0.0.1"},
+    ],
+)
+def test_other_sites_are_refused(server: Server, headers: dict[str, str]) -> None:
+    assert ask(server, "/record/59", **headers)[0] == 403
+
+
+def test_a_browser_is_answered_that_shows_the_page_itself(server: Server) -> None:
+    own = {"Origin": f"http://127.0.0.1:{server.port}", "Sec-Fetch-Site": "same-origin"}
+    assert ask(server, "/values/status", **own)[0] == 200
+
+
+def test_the_page_is_in_no_frame(server: Server) -> None:
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=120)
+    connection.request("HEAD", "/values/status")
+    assert "frame-ancestors 'none'" in connection.getresponse().headers["Content-Security-Policy"]
+    connection.close()
+
+
+def test_silent_connections_hold_up_nobody_and_are_closed(
+    server: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(server.RequestHandlerClass, "timeout", 0.2)
+    silent = [socket.create_connection(("127.0.0.1", server.port), timeout=60) for _ in range(20)]
+    silent[0].sendall(b"GET / HTTP/1.1\r\nHost: 127")
+    assert ask(server, "/values/status")[0] == 200
+    assert all(connection.recv(1) == b"" for connection in silent)
+
+
+def test_a_page_asked_for_again_at_once_is_not_made_again(synthetic_path: Path) -> None:
+    opened = []
+    library = Library(lambda: (opened.append(1), open_store(synthetic_path))[1])
+    assert library.page() == library.page()
+    assert len(opened) == 2  # for the library itself, and for the page
+
+
 def test_nothing_can_be_sent_to_it(server: Server) -> None:
     assert ask(server, "/", method="POST")[0] == 501
     status, body = ask(server, "/", method="HEAD")

@@ -19,9 +19,9 @@ from rubhpc import (
     read_rig,
     simulate,
 )
-from rubhpc.fem.constraints import find_rigid_body_mode
+from rubhpc.fem.constraints import FLOATS, find_rigid_body_mode
 from rubhpc.fem.modes import modes
-from rubhpc.fem.response import first_lateral_frequency, steady_response
+from rubhpc.fem.response import first_lateral_frequency, steady_response, step_limit
 from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.rig.parts import Torsion
 from rubhpc.rig.reading import rig_from_dict, with_keys
@@ -161,6 +161,12 @@ def test_matrices_are_the_identity_of_a_study_not_what_made_them(tmp_path):
     [
         ("def build():\n    return 1 / 0\n", "rig.py:build", "line 2: ZeroDivisionError: division by zero"),
         ("def build(:\n", "rig.py:build", "line 1: SyntaxError"),
+        (
+            "import sys\ndef build():\n    sys.exit()\n",
+            "rig.py:build",
+            "line 3: SystemExit; fix the rig file",
+        ),
+        ("raise GeneratorExit('no')\n", "rig.py:build", "line 1: GeneratorExit: no; fix the rig file"),
         ("import nothing_of_this_name\n", "rig.py:build", "line 1: ModuleNotFoundError"),
         ("def build():\n    return 3\n", "rig.py:build", "returned a int; return a rubhpc.Rig"),
         ("build = 3\n", "rig.py:build", "has no function build"),
@@ -281,7 +287,7 @@ def test_free_motion_is_found_where_contact_or_outputs_see_it():
     free = with_keys(packaged, {"rotor.torsion.free": True})
     assert find_rigid_body_mode(assemble(free)) == "the rotor is free to turn (torsion)"
     loose = with_keys(packaged, {"rotor.bearing.stiffness": 0.0})
-    assert find_rigid_body_mode(assemble(loose)) == "the rotor is free to move"
+    assert find_rigid_body_mode(assemble(loose)) == FLOATS
     unseen = rotor(np.eye(3), None, np.diag([1.0, 1.0, 0.0]), degrees=[*PLANE, (1, "u")], stators=[WALL])
     assert find_rigid_body_mode(assemble(unseen)) == ""
     adrift = MatrixStator(node=1, radius=0.1, mass=[[1.0]], stiffness=[[0.0]])
@@ -289,6 +295,17 @@ def test_free_motion_is_found_where_contact_or_outputs_see_it():
         find_rigid_body_mode(assemble(rotor(stators=[WALL, replace(adrift, angle=1.0)])))
         == "stator 2 is free to move"
     )
+
+
+def test_a_rotor_that_floats_freely_is_named_and_steps_without_a_limit():
+    adrift = rotor(K=0.0 * ONE, stators=[WALL])
+    case = {"speed": 1.0, "clearance": 1e-3, "friction": 0.0, "transient": 0, "revolutions": 1}
+    with pytest.raises(
+        InputError, match=r"the rotor floats freely: .*; add a bearing with a stiffness, or set"
+    ):
+        simulate(adrift, **case)
+    assert step_limit(assemble(adrift)) == math.inf
+    assert not simulate(adrift, method="central-difference", step=1e-2, **case).vertical.any()
 
 
 def test_rotor_free_in_torsion_is_refused_with_the_fix_and_a_soft_drive_twists_alike():
@@ -312,7 +329,14 @@ def ross(**changed):
     from types import SimpleNamespace
 
     K = np.diag(np.arange(1.0, 13.0))
-    given = {"number_dof": 6, "L": 0.5, "bearing_elements": [], "M": lambda _: np.eye(12), "K": lambda _: K}
+    given = {
+        "number_dof": 6,
+        "nodes": [0, 1],
+        "L": 0.5,
+        "bearing_elements": [],
+        "M": lambda _: np.eye(12),
+        "K": lambda _: K,
+    }
     given |= {"C": lambda _: np.zeros((12, 12)), "G": lambda: np.zeros((12, 12))}
     return SimpleNamespace(**(given | changed))
 
@@ -418,7 +442,6 @@ def test_bearings_of_ross_are_frozen_where_a_speed_is_given():
     ("change", "message"),
     [
         ({"speed": None, "frequency": [0.0, 100.0]}, "depends on the whirl frequency"),
-        ({"n_link": 0}, "connects two nodes"),
         ({"mxx": [1.0, 2.0]}, "mxx depends on the speed"),
     ],
 )
@@ -426,6 +449,34 @@ def test_bearings_of_ross_that_no_table_holds_ask_for_a_speed(change, message):
     with pytest.raises(InputError, match=message):
         Rig.from_ross(ross_on_bearing(**change))
     Rig.from_ross(ross_on_bearing(**change), speed=10.0)
+
+
+def test_pedestals_of_ross_have_three_degrees_and_nodes_of_their_own():
+    """At its rows 12 to 14: x, y, z of a mass, to which the bearing at its node 1 is linked."""
+    bearing = ross_bearing(n_link=2)
+    K = bearing.K
+    bearing.K, bearing.C = (lambda w: np.kron([[1, -1], [-1, 1]], K(w))), (lambda w: np.zeros((6, 6)))
+
+    def stiffness(w):
+        entries = np.diag(np.full(15, 1e3))
+        rows = [6, 7, 8, 12, 13, 14]
+        entries[np.ix_(rows, rows)] += bearing.K(w)
+        return entries
+
+    given = {"M": lambda _: np.eye(15), "K": stiffness, "C": lambda _: np.zeros((15, 15))}
+    rotor_ = Rig.from_ross(ross(bearing_elements=[bearing], G=lambda: np.zeros((15, 15)), **given)).rotor
+    assert [name for node, name in rotor_.degrees if node == 3] == ["u", "v", "w"]
+    assert (rotor_.bearing[0].node, rotor_.bearing[0].link) == (2, 3)
+    assert rotor_.stiffness == pytest.approx(1e3 * np.eye(len(rotor_.degrees)))
+    body = assemble(Rig(name="linked", rotor=rotor_)).rotor.at(50.0)
+    near, far = ([body.index(node, name) for name in ("v", "w")] for node in (2, 3))
+    assert body.stiffness[np.ix_(near, far)] == pytest.approx(np.array([[-4.5e6, -1.5e5], [2e5, -1.5e6]]))
+
+
+def test_a_multi_rotor_of_ross_is_refused():
+    geared = type("MultiRotor", (type(ross()),), {})(**vars(ross()))
+    with pytest.raises(InputError, match="the shafts of a MultiRotor turn at different speeds"):
+        Rig.from_ross(geared)
 
 
 def test_a_torsional_node_that_ross_does_not_have_is_refused():

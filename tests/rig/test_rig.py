@@ -10,7 +10,7 @@ import pytest
 
 from rubhpc.errors import InputError
 from rubhpc.rig.parts import Bearing, Damping, Disc, Torsion
-from rubhpc.rig.reading import packaged_rigs, read_rig, rig_from_dict, with_keys
+from rubhpc.rig.reading import PACKAGED, packaged_rigs, read_rig, rig_from_dict, with_keys
 
 
 @pytest.fixture(scope="module")
@@ -29,6 +29,22 @@ def test_the_packaged_rig_is_the_papers(rig):
     assert stator.youngs_modulus * 25e-6 / stator.length == pytest.approx(1.875e6)  # N/m, axial
     assert stator.euler_load == pytest.approx(241, abs=0.5)
     assert rig.contact_radius(stator) == 0.06
+
+
+def test_a_study_in_place_of_a_rig_is_named(tmp_path):
+    (tmp_path / "a.toml").write_text('rig = "b.toml"\n[grid]\nfriction = 0.1\n')
+    with pytest.raises(
+        InputError, match=r'is a study, not a rig; give a rig, as this study does: "b[.]toml"'
+    ):
+        read_rig(tmp_path / "a.toml")
+
+
+def test_a_carrier_that_is_mistyped_is_named(tmp_path):
+    text = '[[carrier]]\nname = "casing"\nmass = 1.0\nstiffness = 1e6\n[[stator]]\ncarrier = "casng"'
+    packaged = (PACKAGED / "mokhtar2017.toml").read_text()
+    (tmp_path / "a.toml").write_text(packaged.replace("[[stator]]", text))
+    with pytest.raises(InputError, match=r"no carrier is named casng; did you mean casing\?"):
+        read_rig(tmp_path / "a.toml")
 
 
 def test_inertia_of_a_disc_is_the_integral_over_its_points():

@@ -8,6 +8,7 @@ import pytest
 import rubhpc
 from postproc.figures.orbit import orbit
 from postproc.report.page import Page
+from postproc.signals.places import moved_at, named_places
 from postproc.signals.spectra import spectrum_data
 from postproc.signals.waveforms import orbit_data, waveform_data
 from rubhpc.errors import InputError
@@ -68,11 +69,40 @@ def test_probes_are_stored_with_their_units(cases):
 
 def test_two_probes_give_the_orbit_whatever_their_angles(cases):
     one = cases.isel(speed_ratio=1)
-    shown, disc = orbit_data(one, probes=("left", "aside")), orbit_data(one)
+    shown, disc = orbit_data(moved_at(one, ("left", "aside"))), orbit_data(one)
     for name in ("vertical", "horizontal"):
         assert shown[name].values == pytest.approx(disc[name].values, abs=1e-10)
     axes = orbit(one, probes=("left", "aside")).show(None)
-    assert axes.get_xlabel().startswith("Horizontal displacement of node 8")
+    assert axes.get_xlabel().startswith("Horizontal displacement (")
+    assert "motion at node 8" in axes.figure.get_suptitle()
+
+
+def test_captions_name_the_places_of_signals(cases):
+    named = named_places(cases)
+    assert named["torsion"].attrs["place"] == "motion at node 8"
+    assert named["spectrum_probe_left"].attrs["place"] == "left: node 8 at -45\N{DEGREE SIGN}"
+    strange = cases.assign_attrs(rig={"rotor": "of another version"})
+    assert named_places(strange) is strange
+    with pytest.raises(InputError, match='run the study with "waveform"'):
+        moved_at(cases.drop_vars("probe_left"), ("left", "aside"))
+
+
+def test_a_place_is_chosen_by_its_node_or_stator(cases):
+    one = cases.isel(speed_ratio=1)
+    assert moved_at(one, node=8) is one
+    assert moved_at(one, stator=1) is one
+    with pytest.raises(InputError, match="not recorded; choose one of 8, or record two displacement probes"):
+        moved_at(one, node=3)  # which one probe looks at
+    with pytest.raises(InputError, match="there is no 2; give 1"):
+        moved_at(one, stator=2)
+    with pytest.raises(InputError, match="give one of them"):
+        moved_at(one, node=8, stator=1)
+    waves = one.assign_attrs(
+        rig=one.attrs["rig"] | {"stator": [one.attrs["rig"]["stator"][0] | {"node": 4, "radius": 0.06}]}
+    )
+    shown = moved_at(waves, node=8)  # no longer the recorded one, seen by left and aside
+    assert shown["vertical"].attrs["place"] == "motion at node 8"
+    assert shown["vertical"].values == pytest.approx(one["vertical"].values, abs=1e-10)
 
 
 @pytest.mark.parametrize(
@@ -86,7 +116,7 @@ def test_two_probes_give_the_orbit_whatever_their_angles(cases):
 )
 def test_what_makes_no_orbit_is_refused(cases, pair, says):
     with pytest.raises(InputError, match=says):
-        orbit_data(cases.isel(speed_ratio=1), probes=pair)
+        moved_at(cases.isel(speed_ratio=1), pair)
 
 
 def test_a_probe_is_a_signal_of_figures_and_of_the_report(cases):

@@ -62,6 +62,16 @@ def test_a_case_that_takes_long_says_where_it_is(clock, capsys):
     ]
 
 
+def test_short_cases_do_not_say_where_they_are(clock, capsys):
+    with Progress(9, 9, n_done=0, quiet=False, has_bar=False) as shown:
+        for n in range(9):
+            shown.say("a case at revolution 3 of its record")
+            clock.time += 2
+            shown.update(Totals(done=n, cost=n))
+            shown.say("")
+    assert "revolution" not in capsys.readouterr().out
+
+
 def test_a_refined_map_of_more_cases_than_predicted_does_not_say_that_it_ends(clock, capsys):
     with Progress(20, 100, n_done=0, quiet=False, has_bar=False) as shown:
         shown.expect(10)

@@ -20,7 +20,7 @@ from postproc.signals.waveforms import waveform_data
 from postproc.store.case_table import write_table
 from postproc.store.live import open_live
 from postproc.store.revolution_table import revolution_table
-from rubhpc.errors import InputError
+from rubhpc.errors import InputError, StoreError
 from rubhpc.running.plan import make_plan
 from rubhpc.running.recompute import reproduce
 from rubhpc.storage.store import Store
@@ -93,6 +93,13 @@ def test_cases_are_those_of_the_function(folder):
 
 def test_a_resumed_study_has_the_same_bytes(folder, tmp_path):
     check_a_lost_chunk(folder / "run_ups.zarr", study_of(tmp_path, STUDY), "revolution_speed")
+
+
+def test_a_longer_case_is_refused_with_the_reason(folder, tmp_path):
+    shutil.copytree(folder / "run_ups.zarr", tmp_path / "run_ups.zarr")
+    longer = study_of(tmp_path, STUDY.replace('"0.5 s"]', '"0.5 s", "0.9 s"]'))
+    with pytest.raises(StoreError, match=r"its arrays have room for 13 revolutions, and a case needs 24"):
+        rubhpc.run(longer, quiet=True)
 
 
 def test_a_plan_counts_the_revolutions_of_every_case(tmp_path):

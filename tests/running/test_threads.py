@@ -7,10 +7,11 @@ import subprocess
 import sys
 
 from running import environment, stored_bytes, write_sample
+from threadpoolctl import threadpool_info, threadpool_limits
 
 import rubhpc
 from rubhpc.study.study import read_study
-from rubhpc.threads import VARIABLES
+from rubhpc.threads import VARIABLES, one_thread
 
 SCRIPT = """
 import os, sys, time, numpy, scipy.linalg
@@ -75,3 +76,19 @@ def test_a_script_stores_what_the_command_does_and_its_libraries_start_no_work_b
     assert n_wake < 5  # 9 to 22 if they are not held
     rubhpc.run(read_study(study, tmp_path / "here.zarr"), quiet=True)  # where VARIABLES hold them
     assert stored_bytes(tmp_path / "here.zarr") == stored_bytes(tmp_path / "tiny.zarr")
+
+
+def test_of_two_at_once_the_last_gives_back_all_threads():
+    def counts() -> list[int]:
+        return [library["num_threads"] for library in threadpool_info()]
+
+    with threadpool_limits(limits=2):
+        before = counts()
+        first, second = one_thread(), one_thread()
+        first.__enter__()
+        second.__enter__()
+        assert set(counts()) == {1}
+        first.__exit__(None, None, None)
+        assert set(counts()) == {1}  # the other still needs it
+        second.__exit__(None, None, None)
+        assert counts() == before

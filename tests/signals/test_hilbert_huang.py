@@ -310,8 +310,8 @@ def test_the_command_shows_the_frequency_and_writes_what_it_draws(run):
     ("args", "said"),
     [
         (["--signal", "twist"], "twist: no such signal"),
-        (["--max-frequency", "-5"], "out of range"),
-        (["--max-frequency", "1 kg"], "--max-frequency"),
+        (["--max", "-5"], "out of range"),
+        (["--max", "1 kg"], "--max"),
         (["--mode", "7"], "does not oscillate"),
         (["--figure", "hht.bmp"], "a figure is one of"),
     ],

@@ -82,7 +82,7 @@ def test_a_line_to_and_fro_is_half_forward_and_half_backward():
 def test_an_orbit_of_two_lobes_has_half_orders():
     v = wave(lambda a: np.cos(a) + 0.4 * np.cos(a / 2))
     w = wave(lambda a: np.sin(a) + 0.4 * np.sin(a / 2))
-    lines = strongest_lines(full_spectrum(v, w))
+    lines = strongest_lines(full_spectrum(v, w).assign_coords(period=2))
     assert list(lines["name"].values) == ["1X", "1/2X"]
     assert lines["amplitude"].values == pytest.approx([1.0, 0.4])
 
@@ -102,36 +102,62 @@ def test_lazy_waveforms_have_lazy_spectra():
 
 
 @pytest.mark.parametrize(
-    ("order", "name"),
+    ("order", "period", "name"),
     [
-        (1.0, "1X"),
-        (0.5, "1/2X"),
-        (5.5, "11/2X"),
-        (-1 / 3, "-1/3X"),
-        (2 / 3, "2/3X"),
-        (2.0, "2X"),
-        (0.7123, "0.71X"),
+        (1.0, 1, "1X"),
+        (0.5, 2, "1/2X"),
+        (0.5, 1, "0.500X"),
+        (5.5, 4, "11/2X"),
+        (-1 / 3, 3, "-1/3X"),
+        (2 / 3, 6, "2/3X"),
+        (2.0, 1, "2X"),
+        (0.7123, 16, "0.712X"),
     ],
 )
-def test_lines_are_named_as_fractions(order, name):
-    assert order_name(order) == name
+def test_lines_are_named_as_fractions(order, period, name):
+    assert order_name(order, period=period) == name
 
 
 def test_lines_beside_their_order_keep_its_name():
     # 16 revolutions hold 5 1/3 periods of a third order: its line falls on 5/16
     signal = wave(lambda a: np.cos(a / 3), revolutions=16)
-    lines = strongest_lines(amplitude_spectrum(signal), n_line=1)
+    lines = strongest_lines(amplitude_spectrum(signal).assign_coords(period=3), n_line=1)
     assert float(lines["order"][0]) == pytest.approx(5 / 16)
     assert str(lines["name"].values[0]) == "1/3X"
 
 
 @pytest.mark.parametrize(
-    ("order", "name"), [(2 / 3, "2/3X"), (21 / 32, "0.66X"), (0.647, "0.66X"), (1.0, "1X")]
+    ("order", "period", "name"),
+    [
+        (2 / 3, 3, "2/3X"),
+        (2 / 3, 2, "0.667X"),
+        (2 / 3, 0, "0.667X"),
+        (21 / 32, 3, "0.656X"),
+        (0.647, 3, "0.647X"),
+        (1.0, 0, "1X"),
+        (2.0, 3, "2X"),
+    ],
 )
-def test_a_line_is_named_by_an_order_only_where_its_sine_lies(order, name):
+def test_a_line_is_a_fraction_only_where_the_period_proves_it(order, period, name):
     # a line at 21/32 alone is no 2/3: of one at 2/3 the next line would have half the height
-    lines = strongest_lines(amplitude_spectrum(wave(lambda a: np.cos(order * a), revolutions=32)), n_line=1)
+    signal = wave(lambda a: np.cos(order * a), revolutions=32)
+    lines = strongest_lines(amplitude_spectrum(signal).assign_coords(period=period), n_line=1)
     assert str(lines["name"].values[0]) == name
+
+
+def test_a_line_without_a_fraction_is_named_by_the_natural_frequency_nearby():
+    signal = wave(lambda a: np.cos(a) + 0.5 * np.cos(0.3394 * a), revolutions=64)
+    spectrum = with_frequency(amplitude_spectrum(signal), xr.DataArray(2 * np.pi * 7000 / 60))
+    lines = strongest_lines(spectrum, 2, natural={"lateral": [116.6], "torsional": [39.6, 200.0]})
+    assert lines["name"].values.tolist() == ["1X", "0.339X"]
+    assert lines["near"].values.tolist() == ["", "torsional 39.6 Hz"]
+
+
+@pytest.mark.parametrize(("settled", "names"), [(1, ["1/3X", "1X"]), (0, ["0.333X", "1X"])])
+def test_a_motion_that_has_not_settled_proves_nothing(settled, names):
+    case = one_case(3, 15).assign(settled=((), settled))
+    lines = strongest_lines(spectrum_data(case, "vertical"))
+    assert sorted(lines["name"].values.tolist()) == sorted(names)
 
 
 def test_the_strongest_lines_come_first_and_weak_ones_not_at_all():
@@ -196,7 +222,7 @@ def test_a_case_of_the_store_has_its_known_lines():
     choice = {"speed_ratio": 1.5, "clearance": 84e-6, "friction": 0.3, "stator_youngs_modulus": 3e9}
     lines = strongest_lines(spectrum_data(select(synthetic_store.make(), choice), "vertical"))
     found = dict(zip(lines["name"].values, lines["amplitude"].values, strict=True))
-    assert found == pytest.approx({"1X": 1e-4, "2X": 3e-5, "1/2X": 2e-5}, rel=1e-5)
+    assert found == pytest.approx({"1X": 1e-4, "2X": 3e-5, "0.500X": 2e-5}, rel=1e-5)  # of no period
     first = 1.5 * synthetic_store.FIRST_LATERAL
     assert lines["frequency"].values == pytest.approx([first, 2 * first, first / 2])
 

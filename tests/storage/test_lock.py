@@ -83,6 +83,16 @@ def test_another_host_is_believed_while_its_heart_beats(path):
         assert read_holder(path).host == socket.gethostname()
 
 
+def test_a_container_of_the_same_host_name_is_believed_while_its_heart_beats(path, dead_pid):
+    leave(path, pid=dead_pid, space="of another container")
+    with pytest.raises(StoreError, match=f"process {dead_pid} on {socket.gethostname()}"):
+        Lock(path).__enter__()
+    old = time.time() - STALE_AFTER - 5
+    os.utime(path, (old, old))
+    with Lock(path):
+        assert read_holder(path).pid == os.getpid()
+
+
 @pytest.mark.parametrize("text", ["", "{", "[]", '{"host": "x"}'])
 def test_a_lock_that_says_nothing_holds_nothing(path, text):
     path.write_text(text)

@@ -212,6 +212,16 @@ def test_the_same_change_of_all_stators_of_a_ring_is_one_difference(store):
     assert differences(ring(0.03), ring(0.04)) == ["rig.stator.*.length (8 of them) was 0.03, is 0.04"]
 
 
+def test_differences_of_another_rig_are_few(store):
+    def shaft(value):
+        return replace(
+            store.manifest, parts={"physics": value, "rig": {"rotor": {f"key{i}": value for i in range(9)}}}
+        )
+
+    found = differences(shaft(1), shaft(2))
+    assert found == [*(f"rig.rotor.key{i} was 1, is 2" for i in range(3)), "6 more of rig.rotor"]
+
+
 def test_lost_values_of_an_axis_are_written_as_a_study_file_may_state_them(store):
     def over(*speeds):
         axis = replace(store.manifest.axes[0], name="speed", dimension="speed", unit="rad s-1", values=speeds)
@@ -266,6 +276,15 @@ def test_the_draft_of_a_killed_creation_is_removed(study):
     draft.mkdir()
     open_store(CaseGrid(study))
     assert not draft.exists()
+
+
+def test_the_draft_of_another_container_is_left(study):
+    import socket
+
+    draft = study.output.with_name(f".tiny.zarr.{socket.gethostname()}.elsewhere.{2**22 + 1}.draft")
+    draft.mkdir()
+    open_store(CaseGrid(study))
+    assert draft.exists()
 
 
 def test_a_draft_is_removed_by_the_next_run_though_the_store_is_there(study, store):

@@ -14,6 +14,7 @@ import rubhpc
 from postproc.figures.bifurcation import default_coloring, draw_bifurcation
 from postproc.report.grid import described_axes
 from postproc.signals.sections import sections_along
+from postproc.store.attributes import table_of
 from postproc.store.select import first_of_rest, select
 from postproc.store.units import caption, written_value
 from rubhpc.cli import commands
@@ -101,7 +102,7 @@ def test_the_page_names_the_directions(store):
 
 
 def test_the_store_keeps_its_study_without_the_added_axis(store):
-    grid = store.attrs["study"]["grid"]
+    grid = table_of(store, "study")["grid"]
     assert list(grid) == ["speed_ratio", "clearance_ratio", "friction"]
     assert grid["speed_ratio"]["sweep"] == "both"
     assert "sweep" not in grid["friction"]

@@ -11,6 +11,7 @@ import synthetic_store
 import xarray as xr
 from click.testing import CliRunner
 
+from postproc.store.attributes import table_of
 from postproc.store.open import open_store
 from rubhpc.commands.export import export
 from rubhpc.errors import InputError
@@ -32,7 +33,8 @@ def test_whole_store_comes_back(synthetic_path, run, tmp_path):
             np.testing.assert_array_equal(back[name], known[name])
             assert back[name].dims == known[name].dims
             assert back[name].attrs.get("units") == known[name].attrs.get("units")
-        assert json.loads(back.attrs["rig"]) == known.attrs["rig"]
+        assert back.attrs["rig"] == known.attrs["rig"]
+        assert table_of(back, "rig")["name"] == "mokhtar2017"
     with h5py.File("study.h5") as file:  # and without xarray
         assert file["vertical"].shape == known["vertical"].shape
         assert file["vertical"].compression == "gzip"

@@ -58,7 +58,16 @@ def test_a_caption_shows_what_was_selected():
             "sample": ("sample", [0, 1]),
         }
     )
-    assert caption(data) == r"$r$ = 0.75, $g$ = 84 µm"
+    assert caption(data).split("\n") == [
+        r"$r$ = 0.75, $g$ = 84 µm,",
+        "$r$: spin speed over first lateral frequency",
+    ]
+
+
+def test_a_caption_names_the_places_of_signals_and_writes_out_high_speeds():
+    left = ("sample", [0.0], {"place": "left: node 3 at -45\N{DEGREE SIGN}"})
+    data = xr.Dataset({"a": left, "b": left}, coords={"speed": ((), 1047.19755, {"units": "rad s-1"})})
+    assert caption(data) == "$\\omega$ = 10000 rpm, left: node 3 at -45\N{DEGREE SIGN}"
 
 
 def test_a_long_caption_takes_as_many_lines_as_it_needs():
@@ -67,7 +76,9 @@ def test_a_long_caption_takes_as_many_lines_as_it_needs():
     lines = caption(data).split("\n")
     assert lines == [
         r"$r$ = 0.75, $c_g$ = 0.75, $\mu$ = 0.75, rotor disc 1 mass = 0.75,",
-        "stator = 0.75, stator 1 angle = 0.75",
+        "stator = 0.75, stator 1 angle = 0.75,",
+        "$r$: spin speed over first lateral frequency,",
+        "$c_g$: clearance over contact-free amplitude",
     ]
 
 

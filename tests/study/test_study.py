@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from malformed import CASES, RIG, STUDY, Malformed
 
 from rubhpc.errors import InputError
-from rubhpc.rig.reading import read_rig
+from rubhpc.rig.reading import PACKAGED, read_rig
 from rubhpc.study.study import Contact, Integrator, Recording, Run, make_axis, read_study
 
 JOBS = Path(__file__).parents[2] / "jobs"
@@ -185,6 +185,11 @@ def test_a_malformed_study_is_refused_in_one_line(tmp_path, monkeypatch, case):
     assert str(refused.value).isprintable()  # one line, too
     assert [fragment for fragment in case.says if fragment not in str(refused.value)] == []
     assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_a_rig_in_place_of_a_study_is_named():
+    with pytest.raises(InputError, match=r"mokhtar2017\.toml: is a rig, not a study"):
+        read_study(PACKAGED / "mokhtar2017.toml")
 
 
 def test_the_malformed_studies_are_many():

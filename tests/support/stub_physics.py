@@ -63,6 +63,7 @@ class Physics:
         recording: Recording,
         initial: None,
         check: Callable[[], None],
+        say: Callable[[str], None],
     ) -> Record:
         self.on_case()
         check()

@@ -7,7 +7,18 @@ import numpy as np
 import pytest
 from lone_bodies import body, set_up, set_up_modal, tip
 
-from rubhpc import InputError, Load, LumpedStator, Rig, assemble, read_rig, simulate
+from rubhpc import (
+    Carrier,
+    InputError,
+    Load,
+    LumpedStator,
+    MatrixStator,
+    Rig,
+    assemble,
+    read_rig,
+    simulate,
+)
+from rubhpc.fem.assemble import model_at
 from rubhpc.fem.statics import sag_at_stators
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.initial_state import at_rest
@@ -15,12 +26,14 @@ from rubhpc.integrate.packing import degrees_of
 from rubhpc.integrate.record import State
 from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.contact_pairs import normal_and_gap
+from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.rig.parts import Bearing, ShaftSection
 from rubhpc.rig.reading import with_keys
 from rubhpc.rig.rotors import Rotor
 from rubhpc.study.study import Contact, Integrator, Recording
 
 G = 9.81  # m/s2
+FAST = 50 * math.pi  # rad/s, 1500 rpm
 METHODS = ["modal", "central-difference"]
 WALL = tip(body(1.0, 1.0, ((1, "axial"),)), math.pi, axial=-1)  # below, and held
 STEEL = {"youngs_modulus": 2.1e11, "shear_modulus": 8e10, "density": 7800.0}
@@ -159,6 +172,87 @@ def test_shaft_at_rest_on_a_stator_stays_there(method, normal):
     assert record.contact_force[0, 1:] == pytest.approx(np.full(255, rest.contact_force[0]), rel=1e-4)
 
 
+def crossed(rig, table=False):
+    """The rig on bearings with circulation: kyz = -kzy = 3e5 N/m, at 1500 rpm where they are tabulated."""
+    keys = {"kyy": 1e6, "kzz": 1e6, "kyz": 3e5, "kzy": -3e5}
+    bearings = [Bearing(node=node, **keys) for node in (1, 15)]
+    if table:
+        keys |= {"kyz": [0.0, 6e5], "kzy": [0.0, -6e5], "damping": 0.0}
+        bearings = [BearingTable(node=node, speed=[0.0, 2 * FAST], **keys) for node in (1, 15)]
+    return replace(rig, rotor=replace(rig.rotor, bearing=tuple(bearings)))
+
+
+def carried(rig):
+    casing = Carrier(name="casing", mass=2.0, stiffness=5e5, inertia=0.02, torsional_stiffness=2e4)
+    return replace(rig, stator=(replace(rig.stator[0], carrier="casing"),), carrier=(casing,))
+
+
+ON_STATOR = heavy(**{"stator.angle": math.pi, "stator.youngs_modulus": 3e10, "rotor.unbalance.mass": 0.0})
+PAIR = tuple(replace(ON_STATOR.stator[0], angle=math.pi + turn) for turn in (-0.3, 0.3))
+
+
+@pytest.mark.parametrize(
+    ("rig", "keys"),
+    [
+        (crossed(ON_STATOR), {}),
+        (crossed(ON_STATOR), {"normal": "updated"}),
+        (crossed(ON_STATOR), {"restitution": 0.5}),
+        (crossed(ON_STATOR), {"friction_law": "coulomb"}),
+        (crossed(ON_STATOR), {"law": "penalty", "stiffness": 5e6}),
+        (crossed(ON_STATOR), {"method": "central-difference", "step": "0.5 us"}),
+        (crossed(ON_STATOR, table=True), {}),
+        (crossed(carried(ON_STATOR)), {}),
+        (crossed(replace(ON_STATOR, stator=PAIR)), {}),
+        (crossed(with_keys(ON_STATOR, {"stator.geometry": "second_order"})), {"normal": "updated"}),
+        (ON_STATOR, {"law": "penalty", "stiffness": 5e6, "friction_law": "coulomb"}),
+    ],
+)
+def test_rest_on_a_stator_is_an_equilibrium(rig, keys):
+    """Also with circulation, of which no strain energy knows, and on the springs of a penalty."""
+    record = simulate(rig, speed=FAST, clearance="150 um", friction=0.0, transient=0, revolutions=1, **keys)
+    assert (record.contact_force[:, 0] > 5.0).all()
+    assert np.ptp(record.vertical) < 1e-11
+    assert np.ptp(record.horizontal) < 1e-11
+    assert record.contact_force[:, -1] == pytest.approx(record.contact_force[:, 0], rel=1e-6)
+
+
+def test_rest_with_circulation_solves_the_static_equations():
+    model = model_at(assemble(crossed(ON_STATOR)), FAST)
+    rotor, stator = model.rotor, model.stators[0]
+    n, m = rotor.n_dof, stator.body.n_dof
+    system, load = np.zeros((n + m + 1, n + m + 1)), np.zeros(n + m + 1)
+    system[:n, :n], system[n : n + m, n : n + m] = rotor.stiffness, stator.body.stiffness
+    # the gap opens as the disc rises, and as the tip below it moves away
+    opens = np.zeros(n + m)
+    opens[rotor.index(8, "v")], opens[n + stator.axial] = 1.0, 1.0
+    system[:-1, -1], system[-1, :-1] = -opens, opens
+    load[:n], load[-1] = model.load, -1.5e-4
+    setup = prepare(
+        crossed(ON_STATOR), FAST, contact=Contact(), integrator=Integrator(), samples_per_revolution=256
+    )
+    known, rest = np.linalg.solve(system, load), at_rest(setup, 1.5e-4)
+    assert rest.contact_force == pytest.approx(known[-1:], rel=1e-6)
+    at = [rotor.index(8, name) for name in ("v", "w")]
+    assert rest.rotor_displacement[at] == pytest.approx(known[at], rel=1e-6)
+
+
+@pytest.mark.parametrize("law", [{}, {"law": "penalty", "stiffness": 5e6}])
+def test_a_touch_of_an_impulse_leaves_the_shaft_at_rest(law):
+    case = {"speed": FAST, "clearance": "150 um", "friction": 0.0, "transient": 0, "revolutions": 1}
+    record = simulate(ON_STATOR, **case, **law, initial={"impulse": 1e-9})
+    assert np.ptp(record.vertical) < 1e-11
+
+
+def test_a_stator_that_is_free_to_move_gives_no_rest():
+    loose = MatrixStator(node=8, angle=math.pi, radius=0.06, mass=[[0.1]], stiffness=[[0.0]])
+    case = {"speed": FAST, "friction": 0.0, "transient": 0, "revolutions": 1, "step": "0.5 us"}
+    case["method"] = "central-difference"
+    rig = replace(ON_STATOR, stator=(loose,))
+    with pytest.raises(InputError, match="finds no rest on the stators that it reaches; constrain them"):
+        simulate(rig, **case, clearance="150 um")
+    assert not simulate(rig, **case, clearance="1 mm").contact_force.any()
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_rub_under_gravity_balances_and_goes_on_from_its_end(method):
     rig = heavy(**{"stator.angle": "150 deg"})
@@ -200,7 +294,7 @@ def test_matrices_take_gravity_and_loads_like_the_beam():
 
 def test_what_nothing_holds_is_refused():
     wall = LumpedStator(node=1, rigid=True, radius=1.0)
-    with pytest.raises(InputError, match="is unconstrained there; add a bearing"):
+    with pytest.raises(InputError, match="floats freely: its bearings do not hold it; add a bearing"):
         assemble(Rig.from_matrices([[1.0]], K=[[0.0]], degrees=[(1, "v")], stators=wall, gravity=G))
     with pytest.raises(InputError, match=r"gravity: cannot be applied to the coordinates q\.\.\."):
         Rig.from_matrices(np.eye(2), K=np.eye(2), degrees=[(1, "v"), (1, "q1")], stators=wall, gravity=G)

@@ -10,6 +10,7 @@ import rubhpc
 from rubhpc import LumpedStator, MatrixStator, Rig, State, Unbalance, assemble, read_rig, simulate
 from rubhpc.fem.modes import modes
 from rubhpc.rig.reading import with_keys
+from rubhpc.rig.rotors import MatrixRotor
 from rubhpc.schema import DONE
 
 SMALL = 1e-12  # m, a gap that is none
@@ -206,7 +207,7 @@ class RossRotor:
     and `BearingElement(kxx=1e6, cxx=0)` at nodes 0 and 14, of steel with E = 210 GPa and G = 79.6 GPa.
     """
 
-    number_dof, L, bearing_elements = 6, 0.8, ()
+    number_dof, L, bearing_elements, nodes = 6, 0.8, (), range(15)
 
     def __init__(self, folder):
         self._entries = np.load(folder / "ross_2.3.0_mokhtar2017.npz")
@@ -265,3 +266,25 @@ def test_unbalance_of_an_oscillator_drives_it():
         assert record.settings["contact_free_amplitude"] == pytest.approx(known, rel=1e-12)
         assert not record.horizontal.any()
     assert rubhpc.assemble(rig).rotor.n_dof == 1
+
+
+RESTS = [(1.6, None, 1.896764), (0.4, 0.5, 6.497982)]
+
+
+@pytest.mark.parametrize(("frequency", "restitution", "impulse"), RESTS)
+def test_rotor_of_one_degree_rests_on_a_wall_in_each_cycle(frequency, restitution, impulse):
+    """x'' + x = cos w t against a wall in the middle; impulses by flights in closed form, root by root.
+
+    On the wall nothing is left free to move.
+    """
+    force = Unbalance(node=1, mass=1 / frequency**2, radius=1.0)
+    rotor = MatrixRotor(mass=[[1.0]], stiffness=[[1.0]], degrees=((1, "v"),), unbalance=(force,))
+    rig = Rig(name="oscillator", rotor=rotor, stator=(LumpedStator(node=1, radius=1.0, rigid=True),))
+    case = {"speed": frequency, "clearance": 0.1 * SMALL, "friction": 0.0, "restitution": restitution}
+    motion = rubhpc.periodic(rig, **case)
+    assert motion.multipliers == pytest.approx([0.0, 0.0])  # what rests has no past
+    assert motion.record.contact_impulse == pytest.approx([impulse], abs=1e-6)
+    for transient in (20, "direct"):
+        record = simulate(rig, **case, transient=transient)
+        assert record.contact_impulse == pytest.approx([impulse], abs=1e-6)
+        assert record.period == 1

@@ -4,10 +4,21 @@ import math
 
 import pytest
 
-from rubhpc import periodic, simulate
-from rubhpc.schema import REGIME
+from rubhpc import periodic, read_rig, simulate
+from rubhpc.rig.reading import with_keys
+from rubhpc.schema import DONE, REGIME
 
 STIFF = {"overrides": {"stator.youngs_modulus": "30 GPa"}, "keep": ()}
+OVERHUNG = with_keys(
+    read_rig("mokhtar2017"),
+    {
+        "rotor.bearing.2.node": 9,
+        "rotor.disc.1.node": 13,
+        "rotor.unbalance.1.node": 13,
+        "stator.node": 13,
+        "rotor.damping.alpha": 2.41,
+    },
+)
 
 
 def test_chaos_within_a_hundredth_of_the_orbit_is_chaos():
@@ -33,3 +44,33 @@ def test_slow_decay_does_not_make_the_period_longer(ratio, clearance_ratio, fric
     assert solution.period == period
     assert record.largest_multiplier == pytest.approx(abs(solution.multipliers[0]), rel=1e-5)
     assert 0.9 < record.largest_multiplier < 1.0
+
+
+@pytest.mark.parametrize(
+    ("rig", "case", "modulus", "lasts"),
+    [
+        ("mokhtar2017", {"speed_ratio": 2.25, "clearance_ratio": 0.95}, "3 GPa", True),
+        ("mokhtar2017", {"speed_ratio": 2.3, "clearance_ratio": 0.8}, "3 GPa", True),
+        (OVERHUNG, {"speed_ratio": 3.253, "clearance_ratio": 0.6224, "friction": 0.4333}, "30 GPa", False),
+        (
+            OVERHUNG,
+            {
+                "speed_ratio": 2.71247,
+                "clearance_ratio": 0.92231,
+                "friction": 0.46382,
+                "friction_law": "coulomb",
+                "restitution": 0.27542,
+            },
+            "8.6595 GPa",
+            False,
+        ),
+    ],
+    ids=["chaos", "other chaos", "diverges", "comes to a torus"],
+)
+def test_chaos_has_settled_where_it_lasts(rig, case, modulus, lasts):
+    """In 2000 later revolutions, by which rounding has made another motion of it."""
+    case = case | {"overrides": {"stator.youngs_modulus": modulus}, "keep": ()}
+    record = simulate(rig, **case)
+    assert (REGIME[record.regime], record.settled) == ("chaotic", int(lasts))
+    later = simulate(rig, **case, transient=2000, initial=record.final)
+    assert (later.status == DONE and REGIME[later.regime] == "chaotic") == lasts

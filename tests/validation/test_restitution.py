@@ -9,11 +9,12 @@ from kernel_case import KernelCase
 from lone_bodies import body, set_up, set_up_modal, tip
 from trial_rig import trial_rig
 
-from rubhpc import State
+from rubhpc import Load, LumpedStator, Rig, State, simulate
 from rubhpc.integrate.case import run_case
 from rubhpc.kernels.central_difference import FINISHED
 from rubhpc.kernels.laws import MULTIPLIER
 from rubhpc.rig.reading import with_keys
+from rubhpc.rig.rotors import MatrixRotor
 from rubhpc.study.study import Contact, Recording
 
 WALL = tip(body(1.0, 1.0, ((1, "axial"),)), 0.0, axial=-1)  # it is held
@@ -102,6 +103,54 @@ def test_bounces_die_out_into_contact():
     assert record.contacts_per_revolution[0] > 1
     assert at_rest == pytest.approx(np.full(4000, 0.5), abs=1e-6)
     assert record.contact_force[0, -4000:] == pytest.approx(np.full(4000, 0.5), rel=1e-3)
+
+
+def bounces(restitution, pull, height, duration):
+    """Impulse, N s, on a wall of 1 kg on a spring of 1 N/m, and when it has come to rest, s.
+
+    The spring pulls with `pull` (N) at the wall. Each impact leaves a share of the speed of the one before.
+    """
+    speed, time = math.sqrt((pull + height) ** 2 - pull**2), math.acos(pull / (pull + height))
+    impulse = speed
+    while speed > 1e-15:
+        speed *= restitution
+        time += 2 * math.atan(speed / pull)
+        impulse += speed + (speed if speed > 1e-15 else 0.0)
+    return impulse + pull * (duration - time), time
+
+
+@pytest.mark.parametrize("n_wall", [1, 2])
+@pytest.mark.parametrize("law", [{}, {"friction_law": "coulomb"}, {"normal": "updated"}])
+@pytest.mark.parametrize(("restitution", "mass"), [(0.0, 1.0), (0.3, 1.0), (0.5, 1e4), (0.9, 1.0)])
+def test_mass_comes_to_rest_on_a_wall_far_above_its_sag(restitution, mass, law, n_wall):
+    """On 1 N/m a kilogram sags by 9.81 m; the wall is 1 m below the spring's end, another 6 m above."""
+    rotor = MatrixRotor(
+        mass=[[mass]],
+        stiffness=[[mass]],
+        degrees=((1, "v"),),
+        load=(Load(node=1, vertical=-9.81 * mass),),
+    )
+    walls = (
+        LumpedStator(node=1, angle=math.pi, radius=100.0, rigid=True),
+        LumpedStator(node=1, radius=100.0, rigid=True, clearance_offset=5.0),
+    )
+    record = simulate(
+        Rig(name="ball", rotor=rotor, stator=walls[:n_wall]),
+        speed=2 * math.pi,
+        clearance=1.0,
+        friction=0.0,
+        restitution=restitution,
+        initial={"vertical": 0.2},
+        transient=0,
+        revolutions=6,
+        **law,
+    )
+    impulse, time = bounces(restitution, 8.81, 0.2, 6.0)
+    assert record.left_closed_form == 0
+    assert record.contact_impulse[0] == pytest.approx(mass * impulse / 6, rel=1e-9)
+    rests = int(256 * time) + 2
+    assert record.vertical[rests:] == pytest.approx(np.full(6 * 256 - rests, -1.0), abs=1e-12)
+    assert record.contact_force[0, rests:] == pytest.approx(np.full(6 * 256 - rests, 8.81 * mass))
 
 
 @pytest.mark.parametrize("elements", [2, 12])

@@ -59,6 +59,7 @@ def ross_rotor(known):
 
     return SimpleNamespace(
         number_dof=6,
+        nodes=range(int(known["n_dof"]) // 6),
         L=float(known["length"]),
         bearing_elements=[bearing(i) for i in range(3)],
         M=lambda speed: at(speed, matrix("M")),

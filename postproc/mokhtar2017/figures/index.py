@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from postproc.figures.style import house_style
 from postproc.mokhtar2017.figures import speed, stiffness, subcritical, supercritical
-from rubhpc.errors import InputError
+from rubhpc.errors import InputError, reason_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -68,4 +68,6 @@ def draw_figures(
                 drawn.savefig(path, dpi="figure", pil_kwargs={"optimize": True})
             yield path
     except OSError as error:
-        raise InputError(f"{folder}: cannot be written: {error.strerror}; choose another --draw") from error
+        raise InputError(
+            f"{folder}: cannot be written: {reason_of(error, folder)}; choose another --draw"
+        ) from error

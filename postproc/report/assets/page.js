@@ -110,6 +110,7 @@ async function update(changes) {
   Object.assign(state, changes);
   if (updating) { again = true; return; }
   updating = true;
+  const slow = setTimeout(() => { byId("loading").hidden = false; }, 200); // ms, below which nothing needs to be said
   do {
     again = false;
     try {
@@ -120,6 +121,8 @@ async function update(changes) {
     }
   } while (again);
   updating = false;
+  clearTimeout(slow);
+  byId("loading").hidden = true;
   document.body.dataset.ready = String(flatOf(state.at));
 }
 
@@ -264,6 +267,7 @@ async function startAt() {
 }
 
 async function begin() {
+  byId("loading").hidden = false;
   await loadLibrary();
   await startAt();
   recallPlace();
@@ -297,6 +301,7 @@ async function begin() {
 }
 
 begin().catch((error) => {
+  byId("loading").hidden = true;
   byId("broken").textContent = `The maps cannot be drawn: ${error.message}`;
   byId("broken").hidden = false;
 });

@@ -98,27 +98,31 @@ class Orbit extends Plane {
     if (!vertical || !horizontal) return this.say(notKept("waveform"));
     this.say("");
     const y = vertical.values.slice(), z = horizontal.values.slice();
-    const reach = 1.15 * Math.max(...y.map(Math.abs), ...z.map(Math.abs), 1e-12);
+    const [low, high] = [Math.min, Math.max].map((f) => [f(...y), f(...z)]);
+    const reach = 0.575 * Math.max(high[0] - low[0], high[1] - low[1], 1e-12);
+    const away = Math.hypot(low[0] + high[0], low[1] + high[1]) / 2; // of the orbit from the shaft without loads
     const isWhole = record.period > 0 && (y.length / record.samples) % record.period === 0;
     this.path.data = isWhole ? { y: [...y, y[0]], z: [...z, z[0]] } : { y, z };
     const turns = y.map((_, i) => i).filter((i) => i % record.samples === 0);
     this.marks.data = { y: turns.map((i) => y[i]), z: turns.map((i) => z[i]) };
     this.first.data = { y: [y[0]], z: [z[0]] };
     const { unit, factor } = facts.signals.vertical;
-    const faces = this.bench(clearance * factor, factor, record.places ?? facts.places, reach);
+    const gap = clearance * factor;
+    const isNear = gap > 0 && gap < 3.5 * reach && Math.abs(gap - away) < 5 * reach;
+    const faces = this.bench(isNear ? gap : 0, factor, record.places ?? facts.places, reach);
     this.label();
-    this.frame([0, ...y, ...faces.map((p) => p[1])], [0, ...z, ...faces.map((p) => p[0])], 1.12);
-    const n = y.length / record.samples;
-    this.describe(`${n} revolutions, reaching ${withUnit(reach / 1.15, unit)}; clearance ${withUnit(clearance * factor, unit)}`);
+    const centre = isNear || away < 3.5 * reach ? [0] : []; // where it is near: a sag may be many orbits large
+    this.frame([...centre, ...y, ...faces.map((p) => p[1])], [...centre, ...z, ...faces.map((p) => p[0])], 1.12);
+    const n = y.length / record.samples, farthest = Math.max(...[...low, ...high].map(Math.abs));
+    this.describe(`${n} revolutions, reaching ${withUnit(farthest, unit)}; clearance ${withUnit(clearance * factor, unit)}`);
   }
 
-  // The circle of the clearance, and the face of each stator; returns the corners of what is seen.
+  // The circle of the clearance, and the face of each stator, none without a gap; returns their corners.
   bench(gap, factor, places, reach) {
-    const isSeen = gap > 0 && gap < 3 * reach;
-    const turn = isSeen ? Array.from({ length: 121 }, (_, i) => (i * Math.PI) / 60) : [];
+    const turn = gap > 0 ? Array.from({ length: 121 }, (_, i) => (i * Math.PI) / 60) : [];
     this.circle.data = { z: turn.map((a) => gap * Math.sin(a)), y: turn.map((a) => gap * Math.cos(a)) };
     const halfAngle = Math.PI / Math.max(places.length, 3); // the stators of a ring do not overlap
-    const faces = (isSeen ? places : []).map(([angle, offset]) => {
+    const faces = (gap > 0 ? places : []).map(([angle, offset]) => {
       const near = gap + offset * factor, far = near + 0.12 * reach, half = Math.min(0.22 * reach, 0.8 * near * Math.tan(halfAngle));
       const [s, c] = [Math.sin(angle), Math.cos(angle)];
       const corner = (along, across) => [along * s + across * c, along * c - across * s];

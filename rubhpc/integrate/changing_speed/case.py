@@ -66,6 +66,7 @@ def record_run_up(
     recording: Recording,
     initial: State | Initial,
     check: Callable[[], None] | None = None,
+    say: Callable[[str], None] = lambda _: None,
 ) -> RunUpRecord:
     """Integrate a case whose speed changes; arguments as of `integrate_run_up` or `integrate_driven`.
 
@@ -76,7 +77,8 @@ def record_run_up(
             '[integrator] method: central-difference keeps the speed constant; set method = "modal"'
         )
     began = time.perf_counter() - seconds_compiling()
-    case: dict[str, Any] = {"clearance": clearance, "friction": friction, "initial": initial, "check": check}
+    case: dict[str, Any] = {"clearance": clearance, "friction": friction, "initial": initial}
+    case |= {"check": check, "say": say}
     found = (
         integrate_driven(setup, law, **case)
         if isinstance(law, DriveLaw)

@@ -78,6 +78,7 @@ def integrate_driven(
     initial: State | Initial,
     pieces_per_revolution: int | None = None,
     check: Callable[[], None] | None = None,
+    say: Callable[[str], None] = lambda _: None,
 ) -> DrivenRun:
     """Integrate a case whose speed is free and record every revolution.
 
@@ -91,6 +92,8 @@ def integrate_driven(
         Number of pieces per revolution, a divisor of its samples; by default as the change of speed requires.
     check : callable, optional
         Called between kernel calls; what it raises ends the case.
+    say : callable
+        Called with the speed reached as often as `check`, if that is given.
 
     Raises
     ------
@@ -107,7 +110,7 @@ def integrate_driven(
     gathered = Turns(n, model)
     driven_by, braked = np.zeros((2, n))
     begins = np.zeros(n + 1)
-    spin = Spin(fastest, drive, clearance, friction, initial, check)
+    spin = Spin(fastest, drive, clearance, friction, initial, check, say)
     n_step, reason, n_done, end, at = 0, "", 0, ALL_TURNED, 0
     energies = np.zeros(6)
     while at < n * per_revolution:

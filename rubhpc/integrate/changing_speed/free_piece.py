@@ -73,11 +73,12 @@ class Spin:
         friction: float,
         initial: State | Initial,
         check: Callable[[], None] | None,
+        say: Callable[[str], None],
     ) -> None:
         assert fastest.free_spin is not None
         model = fastest.model
         self._drive, self._initial, self._clearance = drive, initial, clearance
-        self._pieces, self._passing = Pieces(fastest), Passing(clearance, friction, check)
+        self._pieces, self._passing = Pieces(fastest), Passing(clearance, friction, check, say)
         self._free = fastest.free_spin
         self._gyroscopic = model.rotor.gyroscopic
         self._phasor = model.unbalance_cosine - 1j * model.unbalance_sine

@@ -45,9 +45,15 @@ class Passed(NamedTuple):
 class Passing:
     """Integrates the pieces of a case by one march, which begins again at each of their speeds."""
 
-    def __init__(self, clearance: float, friction: float, check: Callable[[], None] | None) -> None:
+    def __init__(
+        self,
+        clearance: float,
+        friction: float,
+        check: Callable[[], None] | None,
+        say: Callable[[str], None] = lambda _: None,
+    ) -> None:
         self._case = clearance, friction
-        self._check = check
+        self._check, self._say = check, say
         self._march: EventDrivenMarch | None = None
         self._left: tuple[int, Floats] | None = None  # end of the last piece, in modal coordinates
         self._lasted = 0.0  # s, duration of that piece
@@ -69,8 +75,7 @@ class Passing:
         `is_balanced`: its energies are requested. `goes_on`: the piece before was integrated too, with the
         same acceleration and matrices of the same range; or it is the first one, without ringing fast modes.
         """
-        if self._check is not None:
-            self._check()
+        self._look(setup)
         try:
             march = self._begin(setup, n_sample, begun, goes_on=goes_on)
             passed = self._pass(march, setup, n_sample, earlier, is_balanced)
@@ -84,6 +89,12 @@ class Passing:
             even = evenly_forced(setup, n_sample)
             steps = ContactSteppingMarch(even, *self._case, state_at(begun, setup), self._check)
             return self._pass(steps, setup, n_sample, earlier, is_balanced)
+
+    def _look(self, setup: PieceSetup) -> None:
+        """Let the caller end the case, and report the speed."""
+        if self._check is not None:
+            self._check()
+            self._say(f"a case at {setup.spin * 30.0 / math.pi:.0f} rpm")
 
     def continued(
         self, setup: PieceSetup, begun: State | Place, before: Standing | None, change: Change
@@ -141,7 +152,11 @@ class Passing:
         if library is None:
             self._at = setup if march.has_piece_loop else None
             return None
-        found = take_stretch(march, library, block, first, room, begun, earlier, self._check)
+
+        def look(piece: int) -> None:
+            self._look(block[min(piece, len(block) - 1)])
+
+        found = take_stretch(march, library, block, first, room, begun, earlier, look)
         if found is not None:
             self._left, self._lasted = found.left, float(block.interval[first + found.n_piece - 1]) * n_sample
         return found

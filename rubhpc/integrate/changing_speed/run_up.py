@@ -88,6 +88,7 @@ def integrate_run_up(
     initial: State | Initial,
     pieces_per_revolution: int | None = None,
     check: Callable[[], None] | None = None,
+    say: Callable[[str], None] = lambda _: None,
 ) -> RunUp:
     """Integrate a case with a changing speed and record every revolution.
 
@@ -102,9 +103,11 @@ def integrate_run_up(
         of speed requires (`speed_law.cut`).
     check : callable, optional
         Called between kernel calls; what it raises ends the run-up.
+    say : callable
+        Called with the speed reached as often as `check`, if that is given.
     """
     model, per_revolution = fastest.model, fastest.samples_per_revolution
-    pieces, passing = Pieces(fastest), Passing(clearance, friction, check)
+    pieces, passing = Pieces(fastest), Passing(clearance, friction, check, say)
     cuts = pieces.ripples.cut(law, per_revolution, pieces_per_revolution)
     n_stator, n = len(model.stators), law.n_revolution
     angles = 2.0 * np.pi / per_revolution * cuts.astype(np.float64)

@@ -65,7 +65,7 @@ def take_stretch(
     samples: Samples,
     begun: Place,
     earlier: tuple[Accumulator, float],
-    check: Callable[[], None] | None,
+    look: Callable[[int], None],
 ) -> Stretch | None:
     """Integrate the pieces from `first` on, as far as possible; None where that is not possible.
 
@@ -117,8 +117,7 @@ def take_stretch(
         outcome = march.advance_through(pieces, samples, sums)
         if outcome not in (MODE_WANTED, PAUSED):
             break
-        if check is not None:
-            check()
+        look(int(pieces.at[PIECE]))
         if outcome == MODE_WANTED:
             library.reach(int(pieces.at[PIECE]))
             march.find_wanted()

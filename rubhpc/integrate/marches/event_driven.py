@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -322,3 +323,11 @@ class EventDrivenMarch(ContactSets):
 
     def _contact_force(self) -> Floats:
         return self.forces(self._bare_progress["mode"], self._z)
+
+    def state_of(self, motion: Floats, contact_force: Floats) -> State:
+        """State of a reduced motion (2 n,); under a penalty its gaps overlap."""
+        state = super().state_of(motion, contact_force)
+        if not self.bodies.spring:
+            return state
+        gap = self._clearance + self.bodies.gap_jacobian @ motion[: motion.size // 2]
+        return replace(state, overlap=np.maximum(-gap, 0.0))

@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numba import config
 from numpy.typing import NDArray
 
 from rubhpc.fem.statics import sag_at_stators
@@ -37,7 +38,8 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-_BEGUN = bare(new_progress(1))
+# Kernels that are not compiled read fields as attributes, which a plain structured array has none of.
+_BEGUN = new_progress(1) if config.DISABLE_JIT else bare(new_progress(1))  # type: ignore[attr-defined]
 
 
 class Place(NamedTuple):

@@ -119,6 +119,8 @@ def is_torus(distances: Floats) -> bool:
     once, twice = np.diagonal(distances, n), np.diagonal(distances, 2 * n)
     first, last = np.array_split(once, 2)
     near = math.sqrt(once.mean() / (distances.sum() / (distances.size - len(distances))))
+    if not once.any():  # cycles that repeat exactly
+        return False
     ratio = math.sqrt(twice.mean() / once.mean())
     is_even = max(first.mean(), last.mean()) < EVEN**2 * min(first.mean(), last.mean())
     return near < NEAR and TWICE[0] < ratio < TWICE[1] and bool(is_even)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     Solve = Callable[[int], "Solution | None"]
-    Later = Callable[[bool], Iterable[tuple[int, Solve]]]
+    Later = Callable[[bool, bool], Iterable[tuple[int, Solve]]]
     Within = Callable[[], list[float]]
 
 Floats = NDArray[np.float64]
@@ -28,9 +28,11 @@ MOST_EVENTS = 160  # in a period that is solved for; the time of a proof is prop
 MOST_DISTANT = 0.1  # of the orbit's size: a record farther from a motion does not settle on it
 LEAST_REVOLUTIONS = LONGEST_PERIOD  # of a record without a period that is followed further
 TORUS_REVOLUTIONS = 2 * LONGEST_PERIOD  # of a record that may show a torus, or a longer period, by itself
-N_FIRST, N_ALL, N_MOST = 16, 64, 256  # spans of measured growth, each if the one before was not conclusive
-CLEAR = 0.05  # per revolution: sign of a larger exponent over 16 spans is certain
+LASTING_REVOLUTIONS = 1536  # of a record that may show by itself that chaos lasts
+N_FIRST, N_ALL, N_MOST = 12, 64, 256  # spans of measured growth, each if the one before was not conclusive
+CLEAR = 0.05  # per revolution: sign of a larger exponent over 12 spans is certain
 ZERO = 0.01  # per revolution: a smaller exponent counts as zero
+LASTING = 0.03  # per revolution: least mean of the exponents of chaos and of what it is later
 REAL = 1e-6  # imaginary part below which a multiplier counts as real
 SURE = 2.0  # standard errors: an exponent within them counts as zero
 
@@ -68,6 +70,7 @@ def regime(
     solve: Solve | None = None,
     within: Within | None = None,
     later: Later | None = None,
+    lasts: Callable[[float], bool] | None = None,
     n_event: float = 0.0,
 ) -> Verdict:
     """Judge a record.
@@ -81,7 +84,8 @@ def regime(
     some periods. From 16 to 31 revolutions the growth alone decides, because it is measured beyond the
     record. A longer record may show a torus, or a period beyond 16, by itself. A motion that reaches a
     periodic motion in later revolutions is periodic and has not settled. None is sought near the end of a
-    torus, nor later where a period longer than 1 has too many events.
+    torus, nor later where a period longer than 1 has too many events. Chaos has settled if it lasts in later
+    revolutions or, where none are followed, in as many recorded ones.
 
     Parameters
     ----------
@@ -95,8 +99,10 @@ def regime(
     within : callable, optional
         Growth of a small displacement within the record, span by span (`lyapunov.Growth.within`).
     later : callable, optional
-        Searches in later revolutions, in order, where the record looks periodic or does not
-        (`proof.Solver.later`).
+        Searches in later revolutions, in order, where the record looks periodic or does not, and where it
+        looks chaotic or does not (`proof.Solver.later`).
+    lasts : callable, optional
+        Whether chaos of an exponent goes on in them, after these searches.
     n_event : float
         Events in a revolution, where they are known.
     """
@@ -123,6 +129,7 @@ def regime(
         flag = REGIME.index("quasi_periodic")  # a torus around it, still too close to be distinguished
     if repeats and flag != REGIME.index("chaotic"):
         return Verdict(periodic, orbit.closest_return, exponent)
+    is_chaotic = flag == REGIME.index("chaotic")
     is_regular = flag in (periodic, REGIME.index("quasi_periodic"))
     is_torus_shown = is_closed and flag == REGIME.index("quasi_periodic")
     may_be_long = is_long and is_regular and not is_torus_shown and looks_like == 0
@@ -131,11 +138,12 @@ def regime(
         if verdict is not None:
             return verdict._replace(exponent=exponent)
     if later and looks_like == 0 and not (is_torus_shown and 2 * n_event > MOST_EVENTS):
-        verdict = search.proves_any(later(False))
+        verdict = search.proves_any(later(False, is_chaotic))
         if verdict is not None:
             return verdict._replace(exponent=exponent)
-    is_settling = solve is None and flag == periodic
-    return Verdict(flag, period if is_settling else 0, exponent, is_reached=not (is_settling and period > 0))
+    is_settling = solve is None and flag == periodic and period > 0
+    is_passing = is_chaotic and not (lasts(exponent) if lasts else orbit.n_revolution >= LASTING_REVOLUTIONS)
+    return Verdict(flag, period if is_settling else 0, exponent, is_reached=not (is_settling or is_passing))
 
 
 def known_regime(period: int, multiplier: complex, *, is_contact: bool) -> Verdict:
@@ -167,7 +175,7 @@ class _Search:
         closest = self._orbit.closest_return
         if closest not in asked and (verdict := self._proved(closest, solve, asked)):
             return verdict
-        return self.proves_any(later(True))
+        return self.proves_any(later(True, False))
 
     def proves_any(self, trials: Iterable[tuple[int, Solve]]) -> Verdict | None:
         """Judge by the first successful search."""

@@ -35,5 +35,6 @@ def extrapolated(motions: Floats, energy: Floats) -> Floats:
     (m, k), last = turned.shape, np.zeros((max(turned.shape), 1))
     last[:m, 0] = -change[-1] * root
     free = np.zeros(k, dtype=np.int32)  # columns that may be exchanged: all
-    weights = dgelsy(turned, last, free, LEAST_SHARE, m * k)[1][:k, 0]
+    room = max(m, 5) * k  # LAPACK asks for 4 k + 1 where there are fewer rows than columns
+    weights = dgelsy(turned, last, free, LEAST_SHARE, room)[1][:k, 0]
     return np.asarray(motions[-1] + (motions[1:-1] - motions[-1]).T @ weights)

@@ -107,7 +107,7 @@ def unknown_modes(tables: ModeTables) -> PieceModes:
 def know(modes: PieceModes, mode: Mode) -> None:
     """Fill in the row of a mode."""
     place, tables = mode.place, mode.tables
-    modes.gaps[place], modes.n_moving[place] = mode.gaps, mode.moving[-1] + 1
+    modes.gaps[place], modes.n_moving[place] = mode.gaps, mode.moving.max(initial=-1) + 1
     modes.exponent[place], modes.drift[place] = tables.exponent, tables.drift
     modes.floor[place], modes.kind[place] = tables.floor, tables.kind
     modes.offset[place] = tables.offset

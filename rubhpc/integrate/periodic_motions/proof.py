@@ -32,12 +32,14 @@ if TYPE_CHECKING:
 
 MOST_ITERATIONS, LEAST_STEP = 6, 1.0  # a record that looks periodic is near the solution
 PATIENT_ITERATIONS, PATIENT_STEP = 12, 1 / 8  # with shorter steps, from a motion that has come to it
-# Where that finds no stable motion that the record agrees with: revolutions after which it is looked at, 512
-# in all; the distance, of its size, in which the motion then returns if it has come to one, and in which it
-# does if it draws near.
-LATER = 64, 64, 128, 256
-# Of more pairs than a few, what shows no period is looked at that often only; of many never.
-FEW_PAIRS, N_SHORT, MANY_PAIRS = 2, 2, 6
+# Where that finds no stable motion that the record agrees with: revolutions after which it is looked at; the
+# distance, of its size, in which the motion then returns if it has come to one, and in which it does if it
+# draws near.
+LATER = 64, 64, 128, 256, 512, 512
+# How often it is looked at: where it looks periodic, or there are few pairs; where there are more; where
+# there are many. Twice more where it looks chaotic.
+N_LOOKS, N_SHORT, N_MORE = 4, 2, 2
+FEW_PAIRS, MANY_PAIRS = 2, 6
 ARRIVED, DRAWING_NEAR, NEARER = 1e-4, PERIOD_TOLERANCE, 0.5
 NEAR_ENOUGH = 2.0 * DRAWING_NEAR  # of its size: what returns within that is looked at closely
 
@@ -57,6 +59,7 @@ class Solver:
         self._case = setup, clearance, friction, final
         self._piecewise: PiecewiseMotion | None = None
         self._march = march
+        self.followed: tuple[Floats, State] | None = None  # energies at revolutions, and the end
 
     @property
     def has_begun(self) -> bool:
@@ -72,21 +75,28 @@ class Solver:
             return None
         return _solution(self._piecewise, period, MOST_ITERATIONS, LEAST_STEP)
 
-    def later(self, looks_periodic: bool) -> Iterator[tuple[int, Callable[[int], Solution | None]]]:
+    def later(
+        self, looks_periodic: bool, looks_chaotic: bool
+    ) -> Iterator[tuple[int, Callable[[int], Solution | None]]]:
         """Where to look for a motion that is not found at the end: a period, and what solves for it.
 
         A case that looks periodic goes on for 512 revolutions, as does one of one or two pairs. Else one of
-        three to five pairs goes on for 128 and one of more not at all, for the time that it takes. Where its
-        last revolutions return within 1e-4 of the motion's size, and in half the distance of the search
-        before, it may have come to a periodic motion; at the end also where they return within 1 %, nearer
-        than ever and in half the distance of the beginning.
+        three to five pairs goes on for 128 and one of more not at all, for the time that it takes. A case
+        that looks chaotic goes on for longer: 1536, 512 or 128 revolutions. Where its last revolutions return
+        within 1e-4 of the motion's size, and in half the distance of the search before, it may have come to a
+        periodic motion; at the end also where they return within 1 %, nearer than ever and in half the
+        distance of the beginning. A case that reaches the end is in `followed`.
         """
         setup, clearance, friction, state = self._case
         n_on, tried = 0, ARRIVED / NEARER
         n_pair = len(setup.model.stators)
+        n_looks = N_LOOKS if looks_periodic or n_pair <= FEW_PAIRS else N_SHORT
         if n_pair >= MANY_PAIRS and not looks_periodic:
-            return  # what is not recorded may need contact modes of its own
-        spans = LATER if looks_periodic or n_pair <= FEW_PAIRS else LATER[:N_SHORT]
+            n_looks = 0  # what is not recorded may need contact modes of its own
+        spans = LATER[: n_looks + N_MORE * looks_chaotic]
+        if not spans:
+            return
+        energy: list[Floats] = []
         returned: list[float] = []
         try:
             march = self._march or closed_form_march(setup)(setup, clearance, friction, state, None)
@@ -99,7 +109,9 @@ class Solver:
                     return
                 n_on += n_revolution
                 count_followed(n_revolution)
-                period, apart = _return_of(passed, _energy(setup, passed))
+                weights = _energy(setup, passed)
+                energy.append(passed**2 @ weights)
+                period, apart = _return_of(passed, weights)
                 returned.append(apart)
                 draws_near = n_on == sum(spans) and apart <= DRAWING_NEAR and _falls(returned)
                 if apart > NEARER * tried and not draws_near:
@@ -108,6 +120,7 @@ class Solver:
                 later = PiecewiseMotion(setup, clearance, friction, state)
                 yield period, partial(_solved_later, later, n_on)
                 march.start_again(state)
+            self.followed = np.concatenate(energy), march.final()
         except NoClosedForm:
             return
 

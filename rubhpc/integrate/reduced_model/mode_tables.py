@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rubhpc.errors import InputError
+from rubhpc.fem.computable import FAR_APART
 from rubhpc.integrate.reduced_model.energy_forms import Energies, growth_of
 from rubhpc.integrate.reduced_model.friction_mode import FrictionMode
 from rubhpc.kernels import contact_modes as kernel
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 GONE = -40.0  # exponent of a decayed coordinate
+_MOST_GROWTH = 700.0  # exponent of a growing one over the longest step: beyond, its exponential is no float
 NO_ENERGIES = Energies(np.zeros((0, 0)), np.zeros((2, 0), dtype=complex), np.zeros(2))
 
 
@@ -76,6 +79,8 @@ def tabulate(
     enter[:, :n_filled], take_off[:, :n_filled] = mode.enter.T, mode.take_off
     steps = tick * 2.0 ** np.arange(n_level)
     bounded_over = max(steps[-1], tick * 2.0 ** (sample_level + kernel.BOUND_LEVEL))
+    if np.max(exponent.real, initial=0.0) * max(bounded_over, steps[-1]) > _MOST_GROWTH:
+        raise InputError(f"rig: {FAR_APART}")
     growth = np.exp(np.maximum(exponent.real, 0.0) * bounded_over)
     power = np.exp(exponent * steps[:, None]) * used
     is_fast = (exponent.imag == 0.0) & (exponent.real * tick * 2.0**sample_level < -1.0)

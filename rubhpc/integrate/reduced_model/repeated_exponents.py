@@ -41,7 +41,8 @@ def separate(system: Floats) -> tuple[Complexes, Complexes, Complexes] | None:
         Shapes as columns, and the inverse of that matrix. The result is None where shapes coincide, as in
         critical damping.
     """
-    balanced, (scale, _) = matrix_balance(system, permute=False, separate=True)
+    with np.errstate(invalid="ignore"):  # in the permutation that it also makes of the scale
+        balanced, (scale, _) = matrix_balance(system, permute=False, separate=True)
     exponent, shape = (values.astype(np.complex128) for values in np.linalg.eig(balanced))
     is_real = real_ones(exponent)
     for group in _equal(exponent, ROUNDING * float(np.linalg.norm(balanced, 2))):

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from rubhpc.errors import InputError
+from rubhpc.fem.constraints import find_rigid_body_mode, unheld_message
 from rubhpc.integrate.packing import carrier_degrees, degrees_of, output_degrees, whole_system
 from rubhpc.integrate.reduced_model.coupling import coupled_parts
 
@@ -82,10 +83,8 @@ def at_standstill(model: Model) -> Standstill:
         else:
             square, shape = eigh(symmetric[pick], mass[pick])
         if square[0] <= FREE * square[-1]:
-            raise InputError(
-                "[integrator] method: modal needs constrained bodies, and here one is free to move or to "
-                'turn; set method = "central-difference"'
-            )
+            free = find_rigid_body_mode(model) or "here one is free to move or to turn"
+            raise InputError(unheld_message(free))
         mode = np.zeros((mass.shape[0], rows.size))
         mode[rows] = shape
         n_seen = is_seen[rows].sum() + looked_at[rows].any(axis=0).sum()

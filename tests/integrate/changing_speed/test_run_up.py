@@ -334,6 +334,19 @@ def test_orders_are_followed():
     assert np.angle(third[6:-6]) == pytest.approx(-math.pi / 2, abs=5e-3)
 
 
+def test_a_run_up_says_what_speed_it_has_reached():
+    case = {"contact": Contact(), "integrator": Integrator(), "samples_per_revolution": 64}
+    fastest, said = prepare(RIG, 300.0, **case), []
+    law = SpeedLaw(time=(0.0, 0.5), speed=(150.0, 300.0))
+    integrate_run_up(
+        fastest, law, clearance=5e-5, friction=0.1, initial=Initial(), check=lambda: None, say=said.append
+    )
+    speeds = [int(text.removeprefix("a case at ").removesuffix(" rpm")) for text in said]
+    assert speeds == sorted(speeds)
+    assert speeds[0] >= 1432
+    assert speeds[-1] <= 2865
+
+
 @pytest.mark.parametrize(
     "law",
     [

@@ -7,7 +7,7 @@ import pytest
 
 from rubhpc import simulate
 from rubhpc.integrate.measuring.orbit_measures import period
-from rubhpc.integrate.measuring.settling import UNKNOWN, halves, settled
+from rubhpc.integrate.measuring.settling import BLOCK, UNKNOWN, halves, is_steady, settled
 
 SAMPLES, REVOLUTIONS = 32, 64
 TURN = 2 * math.pi * np.arange(REVOLUTIONS * SAMPLES) / SAMPLES
@@ -108,6 +108,18 @@ def test_halves_of_what_is_known():
     assert shift == pytest.approx(32.0)
     assert deviation == pytest.approx((np.arange(32.0).std(ddof=1),) * 2)
     assert shift / deviation[0] == pytest.approx(math.sqrt(12), rel=0.02)
+
+
+@pytest.mark.parametrize("n_block", [4, 16, 48])
+def test_energy_is_steady_up_to_five_standard_errors_of_its_blocks(n_block):
+    noise = np.random.default_rng(n_block).standard_normal(n_block)
+    for half in (noise[: n_block // 2], noise[n_block // 2 :]):
+        half -= half.mean()
+        half /= half.std(ddof=1)
+    error = math.sqrt(2.0 / (n_block // 2))  # of the difference of two means, each of unit scatter
+    for shift, expected in ((0.0, True), (4.9, True), (5.1, False)):
+        blocks = 100.0 + noise + shift * error * (np.arange(n_block) >= n_block // 2)
+        assert is_steady(np.repeat(blocks, BLOCK)) == expected
 
 
 @pytest.mark.parametrize(

@@ -35,3 +35,9 @@ def test_too_few_motions_do_not_show_it():
     assert np.abs(extrapolated(motions, energy) - fixed).max() > 1e-3
     for few in (1, 2):
         assert np.array_equal(extrapolated(motions[:few], energy), motions[few - 1])
+
+
+@pytest.mark.parametrize("width", [2, 4])
+def test_few_degrees_and_many_motions(width):
+    motions = 2.0 + np.outer(0.5 ** np.arange(12), np.arange(1.0, width + 1.0))
+    assert extrapolated(motions, np.ones(width)) == pytest.approx(np.full(width, 2.0), abs=1e-12)

@@ -66,10 +66,18 @@ def test_chaos_that_dies_out_has_not_settled(revolutions):
 
 
 @pytest.mark.parametrize(
-    ("count", "many", "looks_periodic", "expected"),
-    [(2, 6, False, 512), (3, 6, False, 128), (3, 3, False, 0), (3, 3, True, 512)],
+    ("count", "many", "looks", "expected"),
+    [
+        (2, 6, (False, False), 512),
+        (2, 6, (False, True), 1536),
+        (3, 6, (False, False), 128),
+        (3, 6, (False, True), 512),
+        (3, 3, (False, False), 0),
+        (3, 3, (False, True), 128),
+        (3, 3, (True, False), 512),
+    ],
 )
-def test_revolutions_of_many_pairs_are_followed_less_far(monkeypatch, count, many, looks_periodic, expected):
+def test_revolutions_of_many_pairs_are_followed_less_far(monkeypatch, count, many, looks, expected):
     given = {"clearance": 80e-6, "friction": 0.2, "samples_per_revolution": 64}
     record = simulate(trial_rig(count), speed=170.0, transient=2, revolutions=1, keep=(), **given)
     setup = prepare(
@@ -83,5 +91,7 @@ def test_revolutions_of_many_pairs_are_followed_less_far(monkeypatch, count, man
 
     monkeypatch.setattr(EventDrivenMarch, "pass_sections", counted)
     monkeypatch.setattr(proof, "MANY_PAIRS", many)
-    list(proof.Solver(setup, 80e-6, 0.2, record.final).later(looks_periodic))
+    solver = proof.Solver(setup, 80e-6, 0.2, record.final)
+    list(solver.later(*looks))
     assert sum(passed) == expected
+    assert (0 if solver.followed is None else solver.followed[0].size) == expected

@@ -1,0 +1,168 @@
+"""What bearings, seals and their pedestals share: a mass, springs and dampers in two lateral directions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from rubhpc.input.fields import FieldError, check_fields, quantity, table
+from rubhpc.rig.places import Placed
+
+
+@dataclass(frozen=True, kw_only=True)
+class Masses:
+    """A mass in both lateral directions, or one for each."""
+
+    mass: float | None = quantity(
+        "kg",
+        doc="Mass in both lateral directions, in place of myy and mzz.",
+        example='"2 kg"',
+        default=None,
+        at_least=0,
+    )
+    myy: float | None = quantity(
+        "kg", doc="Mass in vertical motion.", example='"2 kg"', default=None, at_least=0
+    )
+    mzz: float | None = quantity(
+        "kg", doc="Mass in horizontal motion.", example='"2 kg"', default=None, at_least=0
+    )
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        _check_pairs(self, "mass", ("myy", "mzz"))
+
+    @property
+    def mass_matrix(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """((myy, 0), (0, mzz)), kg."""
+        myy, mzz = (v if v is not None else self.mass or 0.0 for v in (self.myy, self.mzz))
+        return (myy, 0.0), (0.0, mzz)
+
+    def displaced(self, keys: set[str]) -> dict[str, Any]:
+        """Return the changes of other fields when `keys` are set."""
+        return _displaced_pairs(self, keys, "mass", ("myy", "mzz"))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Springs(Masses):
+    """A linear support: `stiffness` and `damping` in both directions, or full 2x2 matrices."""
+
+    stiffness: float | None = quantity(
+        "N/m",
+        doc="Stiffness in both lateral directions, in place of kyy, kzz, kyz and kzy.",
+        example='"1e6 N/m"',
+        default=None,
+        at_least=0,
+    )
+    kyy: float | None = quantity(
+        "N/m", doc="Vertical stiffness.", example='"1e6 N/m"', default=None, at_least=0
+    )
+    kzz: float | None = quantity(
+        "N/m", doc="Horizontal stiffness.", example='"1e6 N/m"', default=None, at_least=0
+    )
+    kyz: float = quantity(
+        "N/m", doc="Vertical force per horizontal displacement.", example='"2e5 N/m"', default=0.0
+    )
+    kzy: float = quantity(
+        "N/m", doc="Horizontal force per vertical displacement.", example='"-2e5 N/m"', default=0.0
+    )
+    damping: float | None = quantity(
+        "N s/m",
+        doc="Damping in both lateral directions, in place of cyy, czz, cyz and czy.",
+        example='"100 N s/m"',
+        default=None,
+        at_least=0,
+    )
+    cyy: float | None = quantity(
+        "N s/m", doc="Vertical damping.", example='"100 N s/m"', default=None, at_least=0
+    )
+    czz: float | None = quantity(
+        "N s/m", doc="Horizontal damping.", example='"100 N s/m"', default=None, at_least=0
+    )
+    cyz: float = quantity(
+        "N s/m", doc="Vertical force per horizontal velocity.", example='"20 N s/m"', default=0.0
+    )
+    czy: float = quantity(
+        "N s/m", doc="Horizontal force per vertical velocity.", example='"20 N s/m"', default=0.0
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for one, letter in (("stiffness", "k"), ("damping", "c")):
+            _check_pairs(self, one, (f"{letter}yy", f"{letter}zz", f"{letter}yz", f"{letter}zy"))
+        if self.stiffness is None and (self.kyy is None or self.kzz is None):
+            key = "kyy" if self.kyy is None else "kzz"
+            raise FieldError(key, "missing; give either stiffness, or kyy and kzz")
+
+    @property
+    def stiffness_matrix(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """((kyy, kyz), (kzy, kzz)), N/m."""
+        kyy, kzz = (v if v is not None else self.stiffness or 0.0 for v in (self.kyy, self.kzz))
+        return (kyy, self.kyz), (self.kzy, kzz)
+
+    @property
+    def damping_matrix(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """((cyy, cyz), (czy, czz)), N s/m."""
+        cyy, czz = (v if v is not None else self.damping or 0.0 for v in (self.cyy, self.czz))
+        return (cyy, self.cyz), (self.czy, czz)
+
+    def displaced(self, keys: set[str]) -> dict[str, Any]:
+        """Return the changes of other fields when `keys` are set."""
+        changes = super().displaced(keys)
+        for one, letter in (("stiffness", "k"), ("damping", "c")):
+            straight, crossed = (f"{letter}yy", f"{letter}zz"), (f"{letter}yz", f"{letter}zy")
+            changes |= _displaced_pairs(self, keys, one, straight, crossed)
+        return changes
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pedestal(Springs):
+    """A mass on springs on which a bearing stands, on the ground or on another one, such as a foundation."""
+
+    pedestal: Pedestal | None = table(
+        doc="What the pedestal stands on, in series; by default the ground.", default=None
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for i, key in enumerate(("myy", "mzz")):
+            if not self.mass_matrix[i][i]:
+                key = key if self.mass is None else "mass"
+                raise FieldError(
+                    key, "missing or 0; a pedestal has a mass, or join its springs to the bearing"
+                )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Support(Masses, Placed):
+    """A bearing or seal at a node, on the ground or on a pedestal."""
+
+    pedestal: Pedestal | None = table(
+        doc="What the bearing stands on, in series; by default the ground.", default=None
+    )
+
+    def __post_init__(self) -> None:
+        Placed.__post_init__(self)
+        Masses.__post_init__(self)
+
+    def displaced(self, keys: set[str]) -> dict[str, Any]:
+        """Return the changes of other fields when `keys` are set."""
+        return Placed.displaced(self, keys) | Masses.displaced(self, keys)
+
+
+def _check_pairs(owner: Masses, one: str, pairs: tuple[str, ...]) -> None:
+    """Refuse a value for both directions together with those of single ones."""
+    for key in pairs:
+        if getattr(owner, one) is not None and getattr(owner, key) not in (None, 0.0):
+            raise FieldError(key, f"conflicts with {one}; give either {one} or {', '.join(pairs)}")
+
+
+def _displaced_pairs(
+    owner: Masses, keys: set[str], one: str, straight: tuple[str, ...], crossed: tuple[str, ...] = ()
+) -> dict[str, Any]:
+    """Return the changes when the value for both directions, or that of a single one, is set."""
+    common = getattr(owner, one)
+    if one in keys and not keys & {*straight, *crossed}:
+        return dict.fromkeys(straight) | dict.fromkeys(crossed, 0.0)
+    if common is not None and keys & {*straight, *crossed}:
+        return dict.fromkeys(straight, common) | {one: None}
+    return {}
