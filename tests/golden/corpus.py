@@ -1,4 +1,4 @@
-"""Some seventy short cases over all laws and machines, each with its laws named, and what is kept of each.
+"""Some eighty short cases over all laws and machines, each with its laws named, and what is kept of each.
 
 `python tests/golden/corpus.py` computes what `test_golden.py` compares with and writes `corpus.npz`.
 """
