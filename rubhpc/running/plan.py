@@ -312,7 +312,10 @@ def make_plan(study: Study, part: str | None = None, say: Callable[[str], None] 
             )
             found = some.estimate().scaled(1.0, off)
             found = found._replace(seconds=min(found.seconds, bound))
-        memory = _memory(sample, cost.prepared) + _LEDGERS * grid.n_case * kind.itemsize
+        memory = (
+            _memory(sample, None if study.changes_speed else cost.prepared)
+            + _LEDGERS * grid.n_case * kind.itemsize
+        )
     per_case = sum(math.prod(manifest.extent(v)) * np.dtype(v.dtype).itemsize for v in manifest.variables)
     shards = zip(manifest.shape, manifest.shard, strict=False)
     n_shard = math.prod(-(-n // s) for n, s in shards) if manifest.shard else 0
@@ -355,18 +358,21 @@ def make_plan(study: Study, part: str | None = None, say: Callable[[str], None] 
     )
 
 
-def _memory(sample: Sample, prepared: Preparations) -> float:
+def _memory(sample: Sample, prepared: Preparations | None) -> float:
     """Bytes that a process holds at most, but for the measures of all cases.
 
     In a ring those are contact modes: of the longest case, and of set-ups and frictions that are kept beside
-    them. Otherwise this process, which has run cases and written a block, has held as much.
+    them, which those of run-ups include. This process, which has run cases and written a block, has held as
+    much otherwise.
     """
     modes = [case.n_byte for case in sample.cases]
     if not any(modes):
         return peak_memory()
-    n_kept = min(prepared.friction, MOST_SETUPS * prepared.friction / max(prepared.speed, 1.0)) - 1.0
-    beside = min(MOST_BYTES, max(n_kept, 0.0) * float(np.mean(modes)))
-    return sample.memory + _ROOM * (max(modes) + beside)
+    beside = 0.0
+    if prepared is not None:
+        n_kept = min(prepared.friction, MOST_SETUPS * prepared.friction / max(prepared.speed, 1.0)) - 1.0
+        beside = min(MOST_BYTES, max(n_kept, 0.0) * float(np.mean(modes)))
+    return max(peak_memory(), sample.memory + _ROOM * (max(modes) + beside))
 
 
 def _size(n_byte: float) -> str:

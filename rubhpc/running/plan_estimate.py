@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 _WITHIN = 0.95  # by Student's distribution; in fact 0.8 to 0.95, as few cases rarely include the longest
 _FEWEST_FREE = 3  # degrees of freedom of that distribution, at least
 _UPWARD = 1.3  # reach of a range upwards over that downwards: long cases are rare, and missed more often
+_MACHINE = 0.15  # reach at least: processor times change with what else a machine does
 _ALONE = math.log(2.5)  # reach of a range from one case, if there are more
 _LONGEST = math.log(6.0)  # reach, at most
 _MAIN = 0.4  # share of the time from which a part of it is named
@@ -58,19 +59,23 @@ def estimate(cases: list[Timed], n_case: int, steps: float) -> Estimate:
     least, seconds, most = (timed.sum(axis=0) / min(share, 1.0)).tolist()
     down = up = 0.0
     if len(cases) < n_case:
-        reach = _ALONE
-        if len(cases) > 1:
-            from scipy.special import stdtrit
-
-            reach = float(stdtrit(max(len(cases) - 1, _FEWEST_FREE), 0.5 + 0.5 * _WITHIN)) * relative_error(
-                cases, n_case
-            )
+        reach = _reach(cases, n_case)
         down, up = min(reach, _LONGEST), min(_UPWARD * reach, _LONGEST)
     low, high = (
         math.hypot(r, math.log(b)) if b < math.inf else b
         for r, b in ((down, seconds / least), (up, most / seconds))
     )
     return Estimate(seconds, max(seconds * math.exp(-low), min(known, seconds)), seconds * math.exp(high))
+
+
+def _reach(cases: list[Timed], n_case: int) -> float:
+    """Reach of a range downwards, as a factor's logarithm."""
+    if len(cases) == 1:
+        return _ALONE
+    from scipy.special import stdtrit
+
+    student = stdtrit(max(len(cases) - 1, _FEWEST_FREE), 0.5 + 0.5 * _WITHIN)
+    return math.hypot(_MACHINE, float(student) * relative_error(cases, n_case))
 
 
 def relative_error(cases: list[Timed], n_case: int) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import math
 import signal
 import threading
@@ -23,7 +24,6 @@ from rubhpc.running.plan_estimate import relative_error
 from rubhpc.running.trail import Timed, Trail
 from rubhpc.running.worker import record_of
 from rubhpc.schema import FINAL_STATE
-from rubhpc.study.drive_law import DriveLaw
 from rubhpc.study.speed_law import SpeedLaw
 
 if TYPE_CHECKING:
@@ -37,17 +37,15 @@ if TYPE_CHECKING:
 
     Index = tuple[int, ...]
 
-_MOST_CASES, _FEW = (
-    64,
-    6,
-)  # cases; so many share the time, of which one that is short leaves the rest to others
+_MOST_CASES = 200
+_FEW = 6  # cases, which share the time
 _ALL = 24  # cases: of a study of up to so many all are begun
-_ENOUGH, _AGREED = 3.0, 0.15  # s after which no more cases are begun if their mean is known so well
-_LEAST = 1.5  # s of processor time for cases, on a busy machine
-_LEAST_EACH, _LATE = (
-    0.5,
-    0.2,
-)  # s: least time of a case, and how long after its end it is cut if it does not ask
+_ENOUGH, _AGREED = 3.0, 0.15  # s of cases after which no more are begun if their mean is known so well
+_LEAST, _MOST_LATE = 1.5, 8.0  # s of processor time for cases on a busy machine, and of waiting for that
+_LEAST_EACH = 0.5  # s for a case
+_PARTS, _STRIDE, _OFF = 8, 0.618034, 3.0  # of a run-up; between their places; by how much one may be off
+_MOST_RUN_UP = 2.7e9  # bytes of contact modes of a run-up, about: those of other speeds are freed
+_LATE = 0.2  # s after its end at which a case is cut that does not ask
 MOST_BYTES = 800e6  # of this process, above which a case is cut
 _WARM = 4  # checks, and revolutions, that a case is run to load its kernels
 
@@ -95,15 +93,17 @@ class CaseTimer:
         self._ready: set[Contact] = set()
         self._setups = KeptSetups(grid.study)
         self._begun: float | None = None  # processor time when the first case began
+        self._n_part = 0  # parts of run-ups so far
         self._latest: tuple[Case, Timed] | None = None
         self.sample = Sample()
 
     @property
     def left(self) -> float:
-        """Seconds that are left, of processor time at least `_LEAST` from the first case on."""
+        """Seconds that are left; on a busy machine more, so that cases get some processor time."""
+        left = self._end + seconds_compiling() - time.monotonic()
         begun = math.inf if self._begun is None else self._begun
         least = min(begun - time.process_time(), 0.0) + _LEAST
-        return max(self._end + seconds_compiling() - time.monotonic(), least)
+        return max(left, min(least, left + _MOST_LATE))
 
     @contextmanager
     def _alarm(self) -> Iterator[None]:
@@ -129,13 +129,14 @@ class CaseTimer:
         self, missing: NDArray[np.bool_], steps: Callable[[Index], float], say: Callable[[str], None]
     ) -> Sample:
         """Time some of the missing cases, spread over all axes; `say` receives their number."""
-        sample, began = self.sample, self.left
+        sample = self.sample
         n_case = int(missing.sum())
         few = min(n_case, _ALL if n_case <= _ALL else _FEW)
         for k, index in enumerate(spread(missing, _MOST_CASES)):
             if k and self.left <= 0.0:
                 break
-            if k >= few and began - self.left > _ENOUGH and relative_error(sample.cases, n_case) < _AGREED:
+            spent = sum(case.spent for case in sample.cases)
+            if k >= few and spent > _ENOUGH and relative_error(sample.cases, n_case) < _AGREED:
                 break
             say(f"timing cases: {len(sample.cases)} so far")
             limit = max(self.left / max(few - k, 2), _LEAST_EACH)
@@ -167,13 +168,20 @@ class CaseTimer:
     def _add(self, index: Index, steps: float, limit: float, missing: NDArray[np.bool_]) -> None:
         if memory() > 0.5 * MOST_BYTES:
             self._setups = KeptSetups(self._study)
+            gc.collect()
+            if memory() > 0.9 * MOST_BYTES and self.sample.cases:
+                raise Enough
         began = time.process_time()
         case = self._grid.case(index)
         began_at = time.process_time() - began
         self._load_kernels(case)
         self.sample.memory = self.sample.memory or peak_memory()
         self._begun = self._begun or time.process_time()
-        timed = self._time(case, steps, limit)
+        law = case.speed_law
+        if isinstance(law, SpeedLaw) and law.n_revolution >= _PARTS * _WARM:
+            timed = self._time_run_up(case, law, steps, limit)
+        else:
+            timed = self._time(case, steps, limit)
         timed = replace(timed, speed=timed.speed + began_at)
         self._latest = case, timed
         alike = self._alike(case) if timed.n_mode and timed.is_whole else None
@@ -207,8 +215,10 @@ class CaseTimer:
                     raise Enough
 
             short = case_for_kernels(self._study, case)
-            if short.speed_law is not None:
-                short = replace(short, speed_law=_beginning(short.speed_law))
+            if isinstance(
+                law := short.speed_law, SpeedLaw
+            ):  # a whole one takes seconds to be cut into pieces
+                short = replace(short, speed_law=part_of(law, 0, min(law.n_revolution, _WARM)))
             with suppress(Enough):
                 record_of(self._grid, short, KeptSetups(self._study), None, check)
         self._ready.add(case.contact)
@@ -238,6 +248,30 @@ class CaseTimer:
             if seconds_compiling() == compiled:
                 return found
             self.sample.has_compiled = True
+
+    def _time_run_up(self, case: Case, law: SpeedLaw, steps: float, limit: float) -> Timed:
+        """Run a part of a run-up somewhere, then all of it if there is time: rub begins late and costs most.
+
+        Contact modes of a part are met again in others: memory is taken to grow with the square root.
+        """
+        n = law.n_revolution
+        n_part = n // _PARTS
+        first = int((0.5 + self._n_part * _STRIDE) % 1.0 * (n - n_part))
+        self._n_part += 1
+        found = self._time(replace(case, speed_law=part_of(law, first, first + n_part)), steps, limit)
+        whole = (found.spent + found.rest) * n / n_part
+        if found.is_whole and whole <= limit - found.spent:
+            return self._time(case, steps, limit - found.spent)
+        rest = whole - found.spent
+        return replace(
+            found,
+            is_whole=False,
+            share=found.share * n_part / n,
+            rest=rest,
+            least=rest / _OFF,
+            most=rest * _OFF if found.most < math.inf else math.inf,
+            n_byte=min(found.n_byte * math.sqrt(n / n_part), _MOST_RUN_UP),
+        )
 
     def _run(self, case: Case, steps: float, limit: float) -> Timed:
         cut, cut_unknown, record = self._limit(limit), self._limit(math.inf), None
@@ -301,14 +335,12 @@ def spread(missing: NDArray[np.bool_], most: int) -> Iterator[Index]:
             yield index
 
 
-def _beginning(law: SpeedLaw | DriveLaw) -> SpeedLaw | DriveLaw:
-    """The first revolutions of a law: a whole one takes seconds to be cut into pieces."""
-    if isinstance(law, DriveLaw):
-        return replace(law, n_revolution=min(law.n_revolution, _WARM))
-    (_, end), (first, last), _ = law.at_angle(
-        2.0 * np.pi * np.array([0, min(law.n_revolution, _WARM) * (1.0 + 1e-9)])
-    )
-    return SpeedLaw(time=(0.0, float(end)), speed=(float(first), float(last)))
+def part_of(law: SpeedLaw, first: int, last: int) -> SpeedLaw:
+    """A law from one revolution to another."""
+    (begin, end), speeds, _ = law.at_angle(2.0 * np.pi * np.array([first, last * (1.0 + 1e-9)]))
+    inner = [(t, v) for t, v in zip(law.time, law.speed, strict=True) if begin < t < end]
+    times, values = zip(*[(begin, speeds[0]), *inner, (end, speeds[1])], strict=True)
+    return SpeedLaw(time=tuple(map(float, times)), speed=tuple(map(float, values)))
 
 
 def arrays_of(record: Record | RunUpRecord) -> dict[str, NDArray[Any]]:
