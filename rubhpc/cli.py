@@ -118,7 +118,7 @@ def main(args: list[str] | None = None) -> None:
                 f"standard output: {problem()}; what was printed is incomplete, write it to another place",
                 code or (2 if _prints_results(given) else 0),
             )
-        if code:  # Python would tell of each read that the error has cut short
+        if code:  # Python would report each read that the error has cut short
             logging.getLogger("asyncio").setLevel(logging.CRITICAL)
             atexit.register(_end_quietly)
         leave(code)
