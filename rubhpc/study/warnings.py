@@ -9,6 +9,7 @@ import numpy as np
 
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.lasting import decay_message, undamped_message
+from rubhpc.fem.statics import sag_remark
 from rubhpc.units import typed_quantity
 
 if TYPE_CHECKING:
@@ -27,7 +28,8 @@ _MOST_RIGS = 8  # whose modes are looked at; of more, an even spread
 
 def warnings_of(points: OperatingPoints) -> tuple[str, ...]:
     """Return a line for each thing that is likely to be a mistake; none as a rule."""
-    found = (_instability(points), _sag(points), _undamped(points))
+    remark = sag_remark(points.model((0,) * len(points.points.dims)))
+    found = (_instability(points), _sag(points), remark, _undamped(points))
     return tuple(line for line in found if line)
 
 

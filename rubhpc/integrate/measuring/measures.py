@@ -143,7 +143,10 @@ def _others(
         zip(TWISTS, orbit / radius * spin ** np.arange(3) if radius > 0.0 else np.zeros(3), strict=True)
     )
     scale = of_motion | of_twist
-    rate = np.gradient(signals["torsion"]) * (spin * samples_per_revolution / (2.0 * np.pi))
+    turns = signals["torsion"].reshape(-1, samples_per_revolution)  # differences within each of them
+    rate = np.diff(turns, axis=1, append=turns[:, -1:]).ravel() * (
+        spin * samples_per_revolution / (2.0 * np.pi)
+    )
     heard_of = [
         ("displacement", signals["stator_axial"]),
         ("displacement", signals["stator_lateral"]),

@@ -195,7 +195,7 @@ def test_several_pairs_that_slide_under_coulombs_law_branch_as_pairs_that_slide(
         ({"clearance": 1e-4}, "clearance: varies along the branch"),
         ({"start": "1 kg"}, "branch: start: "),
         ({"normal": "updated"}, "branches need motion in closed form"),
-        ({"along": "clearance_ratio", "stop": -0.2}, "clearance_ratio must be at least 0"),
+        ({"along": "clearance_ratio", "start": 0.9, "stop": -0.2}, "clearance_ratio must be at least 0"),
         ({"along": 3}, 'branch: along: 3 is not the name of an axis; give one, such as "friction"'),
         ({"keep": 1}, "branch: keep: 1 is not a list of names"),
     ],
