@@ -45,6 +45,7 @@ _LEAST, _MOST_LATE = 1.5, 8.0  # s of processor time for cases on a busy machine
 _LEAST_EACH = 0.5  # s for a case
 _PARTS, _STRIDE, _OFF = 8, 0.618034, 3.0  # of a run-up; between their places; by how much one may be off
 _MOST_RUN_UP = 2.7e9  # bytes of contact modes of a run-up, about: those of other speeds are freed
+_AGAIN = 0.25  # s: a case with one stator that takes less is run twice
 _LATE = 0.2  # s after its end at which a case is cut that does not ask
 MOST_BYTES = 800e6  # of this process, above which a case is cut
 _WARM = 4  # checks, and revolutions, that a case is run to load its kernels
@@ -150,18 +151,19 @@ class CaseTimer:
         return sample
 
     def time_half(self, seconds: float) -> float:
-        """Time of the latest case with every second stator over that with all, NaN where it is not known.
+        """Time of the latest case that was cut, with every second stator over that with all; NaN if unknown.
 
         It takes so many seconds more, at most.
         """
         if self._latest is None or any(probe.stator for probe in self._study.recording.probe):
             return math.nan
         (case, whole), self._setups = self._latest, KeptSetups(self._study)
+        gc.collect()
         self._end = time.monotonic() + seconds - seconds_compiling()
         fewer = replace(case, rig=replace(case.rig, stator=case.rig.stator[::2]))
         with suppress(Enough, Exception), self._alarm():
             half = self._time(fewer, whole.steps, math.inf)
-            if half.most < math.inf and whole.most < math.inf:
+            if half.most < math.inf:
                 return (half.spent + half.rest) / (whole.spent + whole.rest)
         return math.nan
 
@@ -183,14 +185,15 @@ class CaseTimer:
         else:
             timed = self._time(case, steps, limit)
         timed = replace(timed, speed=timed.speed + began_at)
-        self._latest = case, timed
-        alike = self._alike(case) if timed.n_mode and timed.is_whole else None
-        if alike is not None and self.left > timed.spent:  # with the same contact modes
-            again = self._time(alike, steps, limit)
+        if not timed.is_whole and timed.most < math.inf:
+            self._latest = case, timed
+        other = self._alike(case) if timed.n_mode else case if timed.spent < _AGAIN else None
+        if timed.is_whole and other is not None and self.left > timed.spent:  # with the same contact modes
+            again = self._time(other, steps, limit)
             if again.is_whole:
                 shared = max(timed.spent - again.spent, 0.0)
                 timed = replace(timed, spent=timed.spent - shared, shared=shared)
-                if missing[alike.index]:
+                if other is not case and missing[other.index]:
                     self.sample.cases.append(again)
         self.sample.cases.append(timed)
 
@@ -260,8 +263,8 @@ class CaseTimer:
         self._n_part += 1
         found = self._time(replace(case, speed_law=part_of(law, first, first + n_part)), steps, limit)
         whole = (found.spent + found.rest) * n / n_part
-        if found.is_whole and whole <= limit - found.spent:
-            return self._time(case, steps, limit - found.spent)
+        if found.is_whole and whole <= 0.5 * self.left:
+            return self._time(case, steps, 0.5 * self.left)
         rest = whole - found.spent
         return replace(
             found,
