@@ -58,7 +58,7 @@ def probe(tmp_path):
             [sys.executable, "-c", "import probe.caller"],
             cwd=tmp_path,
             env=environment(
-                PYTHONPATH="",
+                PYTHONPATH=str(tmp_path),
                 NUMBA_CACHE_DIR=str(tmp_path / "cache"),
                 PYTHONDONTWRITEBYTECODE="1",  # Python distinguishes sources by their second and size
             ),
