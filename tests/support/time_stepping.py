@@ -1,9 +1,11 @@
-"""Coulomb's law in all degrees of freedom by time stepping: matrices, steps and contact problem of its own.
+"""Rubs in all degrees of freedom by time stepping: matrices, steps and contact problem of its own.
 
 Matrices come from `reference_bodies`. A step is the exponential of the whole system, in its eigenvectors,
-with the contact forces constant over it. Closed is the gap to which the velocities at its end lead half a
-step later (see `reference`), friction opposes the slip at its end, and the problem of all pairs is solved
-pair by pair until nothing changes (Moreau's and Jean's non-smooth contact dynamics).
+with the contact forces constant over it. Closing the gap at the step's end would let them alternate from step
+to step for ever (the sampled double integrator has its zero at -1); closed is therefore the gap to which the
+end's velocities lead half a step later. Friction opposes the slip at the end, or slides steadily, and the
+problem of all pairs is solved pair by pair until nothing changes (Moreau's and Jean's non-smooth contact
+dynamics).
 """
 
 from __future__ import annotations
@@ -18,8 +20,22 @@ EXACT = 1e-13  # of the largest force, at which the contact problem is solved
 STUCK = 1e-10  # m/s
 
 
-def solve(rig, spin, clearance, friction, revolutions, per_revolution, longest_step, static_ratio=1.0):
-    """Samples from rest by their names in the record, and of each pair its peak force and share of stick."""
+def solve(
+    rig,
+    spin,
+    clearance,
+    friction,
+    revolutions,
+    per_revolution,
+    longest_step,
+    static_ratio=1.0,
+    *,
+    is_sliding=False,
+):
+    """Samples from rest by their names in the record; of each pair peak force, share of stick and contacts.
+
+    Friction obeys Coulomb's law, or slides steadily in the sense of the spin.
+    """
     bodies = set_up(rig, spin)
     n, q = len(bodies.mass), len(rig.stator)
     interval = 2 * math.pi / abs(spin) / per_revolution
@@ -43,19 +59,20 @@ def solve(rig, spin, clearance, friction, revolutions, per_revolution, longest_s
 
     watched = np.block([[gap, np.zeros((q, n))], [np.zeros((q, n)), gap], [np.zeros((q, n)), slip]])
     output = np.zeros((3 + 2 * q, 2 * n))
-    output[range(3 + 2 * q), [*bodies.output, *bodies.rows[:, 3], *bodies.rows[:, 4]]] = 1.0
+    seen = np.concatenate([bodies.output, *bodies.rows[:, 3:].T])
+    output[np.flatnonzero(seen >= 0), seen[seen >= 0]] = 1.0
     force = np.concatenate([np.zeros((n, 2 * q)), inverse @ np.hstack([gap.T, -slip.T])])
     kick = (np.expm1(exponent * h) / exponent)[:, np.newaxis] * (enter @ force)
     answer = ((watched @ shape) @ kick).real
     answer = np.concatenate([answer[:q] + 0.5 * h * answer[q : 2 * q], answer[2 * q :]])
     still = watched @ np.concatenate([sag, np.zeros(n)])
-    still[:q] += clearance
+    still[:q] += clearance + np.array([stator.clearance_offset for stator in rig.stator])
     still[2 * q :] += [rig.contact_radius(stator) * abs(spin) for stator in rig.stator]
     z = enter @ (np.concatenate([start - sag, np.zeros(n)]) - whirl.real)
     signals = np.zeros((revolutions * per_revolution, 3 + 2 * q))
     forces = np.zeros((revolutions * per_revolution, q))
     averaged = max(1, round(20e-6 / h))
-    peak, stick = march(
+    peak, stick, contacts = march(
         np.exp(exponent[is_kept] * h),
         z[is_kept],
         (watched @ shape)[:, is_kept] * share,
@@ -69,6 +86,7 @@ def solve(rig, spin, clearance, friction, revolutions, per_revolution, longest_s
         output @ np.concatenate([sag, np.zeros(n)]),
         per_sample,
         averaged,
+        is_sliding,
         signals,
         forces,
     )
@@ -81,6 +99,7 @@ def solve(rig, spin, clearance, friction, revolutions, per_revolution, longest_s
         "contact_force": forces.T,
         "peak_contact_force": peak,
         "stick_fraction": stick,
+        "contacts": contacts,
     }
 
 
@@ -127,20 +146,16 @@ def march(
     sag,
     per_sample,
     averaged,
+    is_sliding,
     signals,
     forces,
 ):
-    """Step through all samples; peaks of the mean force, and shares of the contact in which pairs stick."""
+    """Step through all samples; peaks of the mean force, shares of contact in which pairs stick, contacts."""
     h, spin, sliding, static = given
     q, m = forces.shape[1], z.size
     normal, tangent, was_stuck = np.zeros(q), np.zeros(q), np.zeros(q, np.bool_)
-    kept, total, peak, touched, stuck = (
-        np.zeros((averaged, q)),
-        np.zeros(q),
-        np.zeros(q),
-        np.zeros(q),
-        np.zeros(q),
-    )
+    kept, was_closed = np.zeros((averaged, q)), np.zeros(q, np.bool_)
+    total, peak, touched, stuck, contacts = np.zeros((5, q))
     free, slip = np.zeros(3 * q), np.zeros(q)
     for k in range(signals.shape[0] * per_sample):
         i_sample = k // per_sample
@@ -177,7 +192,10 @@ def march(
                 if gap < 0.0:
                     whole = nn * tt - nt * tn
                     pressed, held = (moved * nt - gap * tt) / whole, (gap * tn - moved * nn) / whole
-                    if pressed < 0.0 or abs(held) > (static if was_stuck[i] else sliding) * pressed:
+                    if is_sliding:
+                        pressed = -gap / (nn + sliding * nt)
+                        held = sliding * pressed
+                    elif pressed < 0.0 or abs(held) > (static if was_stuck[i] else sliding) * pressed:
                         pressed = -gap / (nn + sliding * nt)
                         held = sliding * pressed
                         if moved + tn * pressed + tt * held < 0.0:
@@ -196,9 +214,11 @@ def march(
                     z[a] += kick[a, i] * normal[i] + kick[a, q + i] * tangent[i]
             was_stuck[i] = normal[i] > 0.0 and abs(slip[i]) < STUCK
             touched[i] += normal[i] > 0.0
+            contacts[i] += normal[i] > 0.0 and not was_closed[i]
+            was_closed[i] = normal[i] > 0.0
             stuck[i] += was_stuck[i]
             forces[i_sample, i] += normal[i] / per_sample
             total[i] += normal[i] - kept[k % averaged, i]
             kept[k % averaged, i] = normal[i]
             peak[i] = max(peak[i], total[i] / averaged)
-    return peak, stuck / np.maximum(touched, 1.0)
+    return peak, stuck / np.maximum(touched, 1.0), contacts

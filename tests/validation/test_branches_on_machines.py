@@ -13,11 +13,9 @@ from rubhpc.rig.reading import with_keys
 from rubhpc.schema import REGIME
 
 PAPER = read_rig("mokhtar2017")
-OVERHUNG = with_keys(PAPER, {"rotor.bearing.2.node": 5})
 HANGING = with_keys(trial_rig(2), {"rotor.bearing.2.node": 2, "rotor.gravity": "9.81 m/s^2"})
 SPRINGS = LumpedStator(node=8, radius=0.06, count=8, mass=1e-3, damping=2.0, stiffness=1e5)
 RING = replace(PAPER, stator=(SPRINGS,))
-COULOMB = {"friction": 0.3, "friction_law": "coulomb"}
 BESIDE = 1e-5  # of the speed, on both sides of an event
 
 
@@ -33,13 +31,6 @@ def settled(rig, value, state, n_revolution, n_seen=8, **case):
         rig, speed_ratio=value, initial=state, transient=n_revolution, revolutions=n_seen,
         samples_per_revolution=64, keep="section", **case,
     )  # fmt: skip
-
-
-def closes(rig, point, **case):
-    """How far a simulation of four revolutions is from the motion with which it begins, over its size."""
-    record = settled(rig, point.value, point.state, 0, **case)
-    section = np.stack([record.sections["section_vertical"], record.sections["section_horizontal"]])
-    return np.abs(section[:, :4] - section[:, :1]).max() / np.abs(section).max()
 
 
 def check_fold(rig, branch, number, n_revolution, **case):
@@ -65,24 +56,6 @@ def check_fold(rig, branch, number, n_revolution, **case):
         assert away[0] < 0.05
         assert away[1] > 10 * away[0]
     return inward
-
-
-@pytest.mark.long
-def test_ring_of_eight_jumps_where_its_branch_folds():
-    case = {"clearance": "240 um", "friction": 0.05, "accuracy": 1e-5}  # at 1e-3 simulations keep other modes
-    branch = followed(RING, 1.3, 1.38, most_points=120, **case)
-    assert branch.points[0].touches == 8
-    assert all(closes(RING, point, **case) < 1e-6 for point in branch.points[:20:5])
-    assert check_fold(RING, branch, 0, 3000, **case) < 0.0
-
-
-@pytest.mark.long
-def test_overhung_disc_jumps_where_its_branch_folds():
-    case = {"clearance_ratio": 0.6, "friction": 0.2}
-    branch = followed(OVERHUNG, 1.3, 1.4, **case)
-    assert [name for name, _ in branch.events()][:2] == ["grazing", "fold"]
-    assert all(closes(OVERHUNG, point, **case) < 1e-6 for point in branch.points[::10])
-    assert check_fold(OVERHUNG, branch, 0, 3000, **case) < 0.0
 
 
 @pytest.mark.long
@@ -166,32 +139,3 @@ def test_unstable_motion_is_left_at_the_rate_of_its_largest_multiplier():
     span = np.flatnonzero((away > 1e-11) & (away < 1e-6))
     rate = np.polyfit(np.arange(span[0], span[-1]), np.log(away[span[0] : span[-1]]), 1)[0]
     assert rate == pytest.approx(np.log(abs(motion.multipliers[0])), rel=0.02)
-
-
-@pytest.mark.long
-def test_overhung_disc_touches_once_more_behind_a_grazing():
-    case = {"clearance_ratio": 0.5, "friction": 0.2}
-    branch = followed(HANGING, 0.93, 0.99, largest_step=0.01, **case)
-    assert [name for name, _ in branch.events()] == ["grazing", "grazing"]
-    for (_, value), sense in zip(branch.events(), (1.0, -1.0), strict=True):
-        state = branch.points[branch.values.tolist().index(value)].state
-        contacts = [
-            settled(HANGING, value * (1.0 + sense * d), state, 1000, **case).contacts_per_revolution.sum()
-            for d in (-1e-6, 1e-6)
-        ]
-        assert contacts == [0.0, 1.0]
-
-
-@pytest.mark.long
-def test_sweeps_find_a_closed_branch_on_another_rig():
-    """A motion of period 3 of a rotor with one stator, which no branch of period 1 leads to."""
-    rig, case = trial_rig(1), {"clearance_ratio": 0.7, "friction": 0.3}
-    found = rubhpc.branch(
-        rig, along="speed_ratio", start=2.2, stop=1.8, sweeps=4, transient=200, doublings=0, most_points=80,
-        keep="section", **case,
-    )  # fmt: skip
-    (branch,) = (one for one in found if one.period == 3)
-    assert branch.end == "the branch is closed"
-    folds = [k for k, (name, _) in enumerate(one for one in branch.events() if one[0] == "fold")]
-    assert check_fold(rig, branch, folds[0], 4000, **case) < 0.0
-    assert check_fold(rig, branch, folds[-1], 4000, **case) > 0.0

@@ -15,6 +15,7 @@ from rubhpc import State
 from rubhpc.integrate.branches.arclength import follow
 from rubhpc.integrate.branches.branching import Branching
 from rubhpc.integrate.branches.events import Event
+from rubhpc.integrate.branches.search import search
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.periodic_motion import find_periodic_motion
 from rubhpc.integrate.periodic_motions.family import Family
@@ -122,6 +123,27 @@ def test_period_doubles_where_the_closed_form_has_it(n):
         )  # fmt: skip
         periods.append(record.measures["period"])
     assert periods == [n, 2 * n]
+
+
+def test_a_branch_is_switched_at_the_doubling_of_shaw_and_holmes():
+    """At w = 2.65334773 for e = 0.8 the multipliers are -1 and -e^2; two impacts a period lead on."""
+    family = Oscillators("speed", 0.7, 0.0, 0.0, 0.8)
+    branching = Branching(family, 0.05)
+    first = family.first(branching, 2.2, motions(2.2, 0.0, 0.0, 0.8, 1)[0], 1)
+    once, twice = search(branching, [first], low=2.1, high=2.7, most=100, doublings=1)
+    (at,) = [k for k, event in enumerate(once.events) if event is Event.PERIOD_DOUBLING]
+    point = once.points[at]
+    assert point.value == pytest.approx(2.65334773, abs=1e-8)
+    assert point.multipliers == pytest.approx(np.array([-1.0, -0.64]), abs=1e-8)
+    assert next(p.n_unstable for p in once.points if p.value > 2.66) == 1
+    assert twice.points[0].value == pytest.approx(point.value, abs=1e-12)
+    assert {p.period for p in twice.points} == {2}
+    assert twice.points[3].n_unstable == 0
+    approach = [
+        piece.approach[0] for r in twice.points[3].revolutions for piece in r.pieces if piece.crossing
+    ]
+    assert len(approach) == 2
+    assert abs(approach[0] - approach[1]) > 1e-3
 
 
 @pytest.mark.parametrize(("damping", "restitution", "frequency"), [(0.05, 0.6, 1.6), (0.02, 0.8, 1.8)])

@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 from lone_bodies import body, set_up, set_up_modal, tip
 
-from rubhpc import State, read_rig, simulate
+from rubhpc import State, simulate
 from rubhpc.integrate.case import run_case
-from rubhpc.rig.reading import with_keys
-from rubhpc.rig.stators import LumpedStator
 from rubhpc.study.study import Contact, Recording
 
 MASS, STIFFNESS, SPEED = 2.0, 1e6, 1.5  # kg, N/m, m/s
@@ -63,41 +61,3 @@ def test_stiff_penalty_tends_to_the_multiplier(normal):
         apart.append(abs(record.vertical - exact.vertical).max() / abs(exact.vertical).max())
     assert apart[0] < 1e-2
     assert apart[0] / apart[1] == pytest.approx(10.0, rel=0.2)
-
-
-@pytest.mark.parametrize("normal", ["fixed", "updated"])
-def test_friction_on_a_held_stator_is_coulombs_at_every_angle(normal):
-    """An isotropic rotor, its stator and its unbalance turn as one."""
-    rig = replace(read_rig("mokhtar2017"), stator=(LumpedStator(node=8, rigid=True),))
-    records = []
-    for angle in (0.0, 1.0, 2.5, 4.0):
-        turned = with_keys(rig, {"stator.angle": angle, "rotor.unbalance.phase": angle})
-        record = simulate(
-            turned,
-            speed_ratio=0.75,
-            clearance="100 um",
-            transient=0,
-            revolutions=1,
-            normal=normal,
-            law="penalty",
-            stiffness="2e6 N/m",
-            damping="50 N*s/m",
-        )
-        records.append((record.vertical + 1j * record.horizontal) * np.exp(-1j * angle))
-        assert record.contact_impulse[0] > 0.0
-        assert abs(record.torsion).max() > 0.0  # friction drives it, nothing else
-        assert not record.stator_axial.any()
-        assert not record.stator_lateral.any()
-    for other in records[1:]:
-        assert abs(other - records[0]).max() < 1e-9 * abs(records[0]).max()
-
-
-def test_both_integrators_agree_on_a_damped_penalty():
-    given = {"speed_ratio": 0.75, "clearance": "84 um", "transient": 20, "revolutions": 4}
-    law = {"law": "penalty", "stiffness": "1e7 N/m", "damping": "100 N*s/m", "friction_law": "coulomb"}
-    one = simulate("mokhtar2017", **given, **law, step="1 us")
-    other = simulate("mokhtar2017", **given, **law, method="central-difference", step="1 us")
-    assert one.peak_contact_force == pytest.approx(other.peak_contact_force, rel=1e-3)
-    assert one.contact_impulse == pytest.approx(other.contact_impulse, rel=1e-3)
-    assert one.peak_torsion == pytest.approx(other.peak_torsion, rel=1e-3)
-    assert max(one.energy_residual, other.energy_residual) < 1e-4

@@ -290,34 +290,3 @@ def test_stator_out_of_reach_is_not_felt(packaged, method, speed_ratio, ratio, a
     assert np.isnan(free.minimum_slip_speed[0])
     assert abs(free.torsion).max() < 1e-20
     assert touched.contact_impulse[0] > 0.0
-
-
-FINER = {
-    "central-difference": [{"step": 0.5e-6}, {"step": 0.25e-6}],
-    "modal": [{"accuracy": 1e-3}, {"accuracy": 1e-5}],
-}
-
-
-@pytest.mark.parametrize("orbit", ["steady", "two_lobes"])
-def test_finer_integration_gives_the_same_orbit(request, orbit, method, packaged, damped):
-    """E10: half the paper's step of 0.5 us, or a hundredth of the error that the modal scheme is allowed."""
-    before = request.getfixturevalue(orbit)
-    rig, friction = (damped, 0.3) if orbit == "steady" else (packaged, 0.4)
-    usual, fine = (
-        simulate(
-            rig,
-            speed=before.spin_speed,
-            clearance=before.clearance,
-            friction=friction,
-            transient=2,
-            revolutions=2,
-            initial=before.final,
-            **(method | changed),
-        )
-        for changed in FINER[method["method"]]
-    )
-    for name in ("vertical", "horizontal", "torsion", "stator_axial", "stator_lateral"):
-        check_close(getattr(usual, name), getattr(fine, name), 1e-4, name)
-    for name in ("peak_contact_force", "contact_impulse", "friction_work", "minimum_slip_speed"):
-        assert getattr(usual, name) == pytest.approx(getattr(fine, name), rel=1e-4), name
-    assert usual.period == fine.period == before.period
