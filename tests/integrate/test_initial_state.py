@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from record_distance import MOTIONS
 from trial_rig import trial_rig
 
 from rubhpc import LumpedStator, read_rig, simulate
@@ -108,6 +109,34 @@ def test_a_wall_that_moves_out_lets_go(method):
     assert np.array_equal(start.displacement, state.displacement)
     free = run_case(setup, clearance=1e-2, friction=0.1, recording=SHORT, initial=state)
     assert free.contact_fraction.tolist() == [0.0]
+
+
+PENALTY, COULOMB = {"law": "penalty", "stiffness": 1e7, "damping": 300.0}, {"friction_law": "coulomb"}
+ALL_LAWS = [{}, COULOMB, PENALTY, PENALTY | COULOMB, {"restitution": 0.5}, {"normal": "updated"}]
+ALL_LAWS += [
+    law | {"method": "central-difference", "step": "1 us"}
+    for law in ({}, COULOMB, PENALTY, {"normal": "updated"})
+]
+
+
+@pytest.mark.parametrize("law", ALL_LAWS, ids=lambda law: " ".join(map(str, law.values())))
+def test_two_runs_that_meet_amid_a_contact_are_one(law):
+    """Forces, overlaps and stick follow from the state at the end, and no contact is counted twice."""
+    given = {"speed": 170.0, "clearance": "20 um", "friction": 0.2, "accuracy": 1e-6} | law
+    whole = simulate(trial_rig(3), **given, transient=0, revolutions=4)
+    first = simulate(trial_rig(3), **given, transient=0, revolutions=3)
+    assert first.final.contact_force.max() > 0.1
+    second = simulate(trial_rig(3), **given, transient=0, revolutions=1, initial=first.final)
+    for name in (*MOTIONS, "contact_force"):
+        expected = getattr(whole, name)[..., 768:]
+        assert getattr(second, name) == pytest.approx(expected, rel=0, abs=1e-8 * abs(expected).max()), name
+    for name in ("contacts_per_revolution", "contact_impulse"):
+        parts = 3 * getattr(first, name) + getattr(second, name)
+        assert parts == pytest.approx(4 * getattr(whole, name), rel=1e-8), name
+    for name in ("rotor_displacement", "rotor_velocity"):
+        expected = getattr(whole.final, name)
+        scale = 1e-8 * abs(expected).max()
+        assert getattr(second.final, name) == pytest.approx(expected, rel=0, abs=scale), name
 
 
 def test_what_a_penalty_overlaps_stays_and_what_a_wall_adds_goes():

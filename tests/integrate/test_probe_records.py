@@ -10,10 +10,6 @@ from rubhpc import Probe, simulate
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.probes import with_probes
 from rubhpc.fem.response import steady_response
-from rubhpc.integrate.packing import degrees_of, whole_system
-from rubhpc.integrate.reduced_model.reduction import reduce_model
-from rubhpc.integrate.reduced_model.standstill import cutoff_frequency
-from rubhpc.kernels.contact_pairs import AXIAL, TORSION, V, W
 
 SPIN = 210.0
 ACCELERATIONS = (
@@ -24,30 +20,6 @@ ACCELERATIONS = (
     Probe(name="root", stator=1, quantity="foundation_force"),
 )
 SHORT = {"speed": SPIN, "clearance": "60 um", "revolutions": 2, "samples_per_revolution": 64}
-
-
-@pytest.mark.parametrize("accuracy", [1e-2, 1e-3, 1e-5])
-def test_probes_meet_the_full_model_up_to_the_cutoff(accuracy):
-    """To within 0.5 % in the mean square over the band, for the force of a contact with friction."""
-    rig = trial_rig()
-    model = with_probes(assemble(rig), rig, ACCELERATIONS, SPIN)
-    reduced = reduce_model(model, SPIN, accuracy)
-    mass, damping, stiffness, _ = whole_system(model, SPIN)
-    degree = degrees_of(model)[0]
-    force = np.zeros(len(mass))
-    force[degree[[V, W, TORSION, AXIAL]]] = -math.cos(0.3), -math.sin(0.3), -0.3 * 0.06, 1.0
-    n, full, found = len(reduced.stiffness), [], []
-    for frequency in np.linspace(0.01, 1.0, 160) * cutoff_frequency(model, SPIN, accuracy):
-        factors = (1j * frequency) ** np.arange(3)
-        u = np.linalg.solve(stiffness - frequency**2 * mass + 1j * frequency * damping, force)
-        x = np.linalg.solve(
-            reduced.stiffness - frequency**2 * np.eye(n) + 1j * frequency * reduced.damping,
-            reduced.basis.T @ force,
-        )
-        full.append(factors @ (model.probe_rows @ u))
-        found.append(factors @ (reduced.probe @ x))
-    error = np.linalg.norm(np.array(found) - full, axis=0) / np.linalg.norm(full, axis=0)
-    assert error.max() < 5e-3
 
 
 def test_steady_motion_without_contact_is_the_unbalance_response():
@@ -114,24 +86,6 @@ def test_a_probe_where_a_signal_is_recorded_records_that_signal(scheme):
     for name, probe in twin.items():
         signal = record.signals[name]
         assert record.signals[f"probe_{probe.name}"] == pytest.approx(signal, abs=1e-9 * np.abs(signal).max())
-
-
-def test_schemes_agree_on_motion_and_forces_elsewhere():
-    rig = trial_rig()
-    probes = (
-        Probe(name="end", node=5, angle=1.0),
-        Probe(name="rate", node=2, quantity="velocity"),
-        Probe(name="force", node=1, quantity="bearing_force"),
-        Probe(name="tip", stator=1, angle=0.7, quantity="velocity"),
-        Probe(name="root", stator=1, quantity="foundation_force"),
-    )
-    exact, stepped = (
-        simulate(rig, **SHORT, transient=1, probes=probes, accuracy=1e-5, **scheme)
-        for scheme in ({}, {"method": "central-difference", "step": "0.2 us"})
-    )
-    for probe in probes:
-        a, b = (record.signals[f"probe_{probe.name}"] for record in (exact, stepped))
-        assert np.linalg.norm(a - b) < 0.01 * np.linalg.norm(b), probe.name
 
 
 def test_probes_may_be_given_by_their_keys_and_leave_the_rest_alone():

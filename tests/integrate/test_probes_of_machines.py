@@ -74,6 +74,9 @@ MACHINES = {
             Probe(name="tip", stator=3, angle=0.2, quantity="acceleration"),
             Probe(name="root", stator=1, quantity="foundation_force"),
             sideways("span", 2, 0.4),
+            sideways("rate", 2, 0.0, "velocity"),
+            sideways("end", 5, 1.0, "displacement"),
+            Probe(name="tip_rate", stator=1, angle=0.7, quantity="velocity"),
         ),
     ),
 }

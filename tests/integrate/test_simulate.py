@@ -205,31 +205,6 @@ def test_fewer_samples_see_the_same_motion():
     assert few.contact_force == pytest.approx(mean, rel=1e-6, abs=1e-9)
 
 
-@pytest.mark.parametrize("method", [{"method": "central-difference", "step": 2e-6}, {"method": "modal"}])
-@pytest.mark.parametrize("normal", ["fixed", "updated"])
-@pytest.mark.parametrize(("phase", "is_touching"), [(0.0, True), (math.pi, False)])
-def test_run_goes_on_from_its_final_state(phase, is_touching, normal, method):
-    """Also amid a contact, whose force fixes the acceleration there."""
-    given = RUB | method | {"normal": normal, "overrides": {"rotor.unbalance.phase": phase}}
-    first, whole = simulate(RIG, **(given | {"revolutions": 1})), simulate(RIG, **given)
-    assert (first.final.contact_force[0] > 1.0) == is_touching
-    second = simulate(RIG, **(given | {"revolutions": 1}), initial=first.final)
-    # Steps of order 4 amid a contact begin again with the run: their error, not rounding, is what differs.
-    is_stepped = normal == "updated" and method["method"] == "modal"
-    for name in SIGNAL_NAMES:
-        expected = getattr(whole, name)[..., 256:]
-        # Accelerations and forces of the first step weigh rounding by 1 / h and 1 / h^2.
-        is_second = name in ("torsion_acceleration", "contact_force")
-        share = (2e-5 if is_second else 1e-6) if is_stepped else (1e-6 if is_second else 1e-9)
-        assert getattr(second, name) == pytest.approx(expected, rel=0, abs=share * abs(expected).max()), name
-    # A contact under way is counted where it began.
-    counts = [record.contacts_per_revolution[0] for record in (first, second)]
-    assert sum(counts) == 2 * whole.contacts_per_revolution[0] > 0
-    for name in ("rotor_displacement", "rotor_velocity"):
-        one, other = getattr(second.final, name), getattr(whole.final, name)
-        assert one == pytest.approx(other, rel=0, abs=(1e-6 if is_stepped else 1e-8) * abs(other).max()), name
-
-
 def test_transient_is_run_but_not_recorded():
     late = simulate(RIG, **(RUB | {"transient": 1, "revolutions": 1}))
     whole = simulate(RIG, **RUB)

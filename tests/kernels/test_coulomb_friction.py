@@ -16,7 +16,6 @@ from rubhpc.kernels.lemke import solve_lemke
 from rubhpc.rig.reading import with_keys
 
 COULOMB = MULTIPLIER._replace(friction_law=COULOMB_LAW)
-STEP, SPIN, RADIUS = 1e-6, 150.0, 0.06  # s, rad/s, m
 
 
 def test_complementarity_with_a_zero_diagonal_is_solved():
@@ -36,36 +35,6 @@ def test_problem_without_solution_is_reported():
     tableau = np.array([[1.0, 1.0, -1.0, -1.0]])  # w = -z - 1
     assert solve_lemke(tableau, np.zeros(1, dtype=np.int64), 1) == UNSOLVED
     assert linprog([0.0], A_ub=[[1.0]], b_ub=[-1.0], bounds=[(0, None)]).status == 2  # infeasible indeed
-
-
-@pytest.mark.parametrize("is_updated", [False, True])
-def test_sliding_that_never_turns_round_is_that_of_the_steady_law(is_updated):
-    """The disc thrown between stators, two of which touch at a time: forces and motion to rounding."""
-    cases = [
-        KernelCase.of(
-            trial_rig(3),
-            600.0,
-            20_000,
-            clearance=2e-5,
-            friction=0.1,
-            is_updated=is_updated,
-            law=law,
-        )
-        for law in (MULTIPLIER, COULOMB)
-    ]
-    n_both = 0
-    for case in cases:
-        case.state[1, case.packed.output_row[0]] = 0.4
-    for i in range(1000):
-        for case in cases:
-            assert case.advance(i, i + 1) == FINISHED
-        steady, coulomb = cases
-        assert coulomb.work.force == pytest.approx(steady.work.force, rel=1e-7, abs=1e-7)
-        n_both += np.count_nonzero(steady.work.force) > 1
-        assert not coulomb.work.is_sticking.any()
-    assert n_both > 0
-    scale = abs(steady.state).max(axis=1, keepdims=True)
-    assert (abs(coulomb.state - steady.state) <= 1e-9 * scale).all()
 
 
 @pytest.mark.parametrize("spin", [1e-10, -1e-10])

@@ -228,8 +228,11 @@ def test_a_ring_of_masses_agrees_with_equations_written_in_the_plane():
         revolutions=revolutions,
         samples_per_revolution=per_revolution,
         accuracy=1e-6,
+        probes=[{"name": "foot", "stator": 1, "angle": 0.7, "quantity": "foundation_force"}],
     )
     assert found.peak_contact_force.max() > 1.0
+    borne = np.array([math.cos(0.7), math.sin(0.7)]) @ (2e5 * exact[2:4] + 30.0 * exact[13:15])
+    np.testing.assert_allclose(found.signals["probe_foot"], borne, atol=2e-3 * abs(borne).max())
     scale = abs(exact[:2]).max()
     np.testing.assert_allclose(found.vertical, exact[0], atol=2e-4 * scale)
     np.testing.assert_allclose(found.horizontal, exact[1], atol=2e-4 * scale)

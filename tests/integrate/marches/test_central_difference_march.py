@@ -14,17 +14,23 @@ from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import step_limit
 from rubhpc.kernels.central_difference import CONTACT_UNSOLVED, DIVERGED, FINISHED
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, TORSION, V, W
+from rubhpc.rig.forces import Unbalance
 from rubhpc.rig.parts import Bearing
 from rubhpc.rig.reading import with_keys
 
 PACKAGED = read_rig("mokhtar2017")
-ANGLES = (0.3, 0.5, 2.4)
-# What the packaged rig lacks: more stators, and bearings that couple the planes.
+STATOR = PACKAGED.stator[0]
+# What the packaged rig lacks: other stators, unbalances, and bearings that couple the planes.
 COUPLED = replace(
     PACKAGED,
-    stator=tuple(replace(PACKAGED.stator[0], angle=angle, node=8) for angle in ANGLES),
+    stator=(
+        replace(STATOR, angle=0.3),
+        replace(STATOR, angle=0.5, lateral=False, youngs_modulus=1e9),
+        replace(STATOR, angle=2.4, node=5, radius=0.03, clearance_offset=2e-6),
+    ),
     rotor=replace(
         PACKAGED.rotor,
+        unbalance=(*PACKAGED.rotor.unbalance, Unbalance(node=4, mass=0.01, radius=0.02, phase=1.0)),
         bearing=(
             Bearing(node=1, kyy=1e6, kzz=2e6, kyz=3e5, kzy=-2e5, cyy=200.0, czz=100.0, cyz=30.0, czy=-10.0),
             Bearing(node=15, stiffness=8e5, damping=50.0),
@@ -50,7 +56,7 @@ class PaperScheme:
         self.cosine[: model.rotor.n_dof] = spin**2 * model.unbalance_cosine
         self.sine[: model.rotor.n_dof] = spin**2 * model.unbalance_sine
         q = len(model.stators)
-        self.gap_at_rest = np.full(q, clearance)
+        self.gap_at_rest = clearance + np.array([stator.clearance_offset for stator in model.stators])
         self.G_N, self.G_T = np.zeros((2, q, n))
         first = model.rotor.n_dof
         for i, stator in enumerate(model.stators):
@@ -58,7 +64,9 @@ class PaperScheme:
             cosine, sine = math.cos(stator.angle), math.sin(stator.angle)
             self.G_N[i, [v, w, first + stator.axial]] = -cosine, -sine, 1.0
             # minus the slip of the rim on the tip, t = (-sine, cosine)
-            self.G_T[i, [v, w, thx, first + stator.lateral]] = sine, -cosine, -stator.radius, 1.0
+            self.G_T[i, [v, w, thx]] = sine, -cosine, -stator.radius
+            if stator.lateral >= 0:
+                self.G_T[i, first + stator.lateral] = 1.0
             first += stator.body.n_dof
         self.G_NT = self.G_N + math.copysign(friction, spin) * self.G_T
 

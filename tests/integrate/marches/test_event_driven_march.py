@@ -1,7 +1,6 @@
 """Whole cases by the exact modal integrator: what must hold to rounding, and what happens at its edges."""
 
 import math
-import re
 import time
 from dataclasses import replace
 from functools import partial
@@ -18,7 +17,6 @@ from rubhpc.fem.response import steady_response
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.marches import event_driven as event_driven_march
 from rubhpc.integrate.marches import march, met_modes
-from rubhpc.integrate.marches.march import NO_FORCES
 from rubhpc.integrate.measuring.divergence import energy_limit
 from rubhpc.integrate.reduced_model import mode_library
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
@@ -32,7 +30,7 @@ from rubhpc.rig.reading import with_keys
 from rubhpc.rig.rig import Rig
 from rubhpc.rig.rotors import Rotor
 from rubhpc.rig.stators import LumpedStator
-from rubhpc.schema import DIVERGED, DONE, SCHEMES
+from rubhpc.schema import DONE, SCHEMES
 from rubhpc.study.study import Contact, Integrator, Recording
 
 SPEED = 170.0
@@ -59,26 +57,6 @@ def test_shorter_kernel_calls_change_nothing_but_rounding(monkeypatch, n_stator,
         assert getattr(pieces, name) == pytest.approx(getattr(usual, name), rel=1e-7), name
     assert pieces.peak_to_peak_vertical == pytest.approx(usual.peak_to_peak_vertical, rel=1e-9)
     assert pieces.energy_residual == pytest.approx(usual.energy_residual, rel=1e-3)
-
-
-def test_same_case_is_the_same_to_the_last_bit():
-    once, again = (simulate(trial_rig(2), **RUB) for _ in range(2))
-    for name in once.signals:
-        assert np.array_equal(getattr(once, name), getattr(again, name))
-
-
-def test_case_does_not_depend_on_those_before_it():
-    """Cases of one speed and friction share their tables, and other cases meet other sets of contacts."""
-    rig, recording = trial_rig(3), Recording(transient=1, revolutions=2)
-
-    def alone(*clearances):
-        setup = prepare(rig, SPEED, contact=Contact(), integrator=Integrator(), samples_per_revolution=256)
-        return [run_case(setup, clearance=c, friction=0.2, recording=recording) for c in clearances][-1]
-
-    after, fresh = alone(30e-6, 60e-6, 40e-6), alone(40e-6)
-    for name in after.signals:
-        assert np.array_equal(getattr(after, name), getattr(fresh, name)), name
-    assert after.contact_impulse.tolist() == fresh.contact_impulse.tolist()
 
 
 def test_sets_are_made_anew_where_there_is_no_room_for_all(monkeypatch):
@@ -161,14 +139,6 @@ def test_endless_events_are_those_of_a_revolution(monkeypatch, since, left):
     assert simulate(trial_rig(3), **CLOSE).left_closed_form == left
 
 
-def test_sets_of_contacts_are_met_as_they_come():
-    """With three stators some touch together, and no set but the singles is tabulated at the start."""
-    record = simulate(trial_rig(3), **CLOSE)
-    touching = record.contact_force > 0.0
-    assert (touching.sum(axis=0) == 2).mean() > 0.05
-    assert record.energy_residual < 1e-4
-
-
 @pytest.mark.parametrize("too_many", ["sets", "events"])
 def test_endless_events_are_left_to_short_steps(monkeypatch, too_many):
     """More sets of contacts, or more events, than allowed: the case is done in steps, to the same answer."""
@@ -186,20 +156,6 @@ def test_endless_events_are_left_to_short_steps(monkeypatch, too_many):
     check_close(stepped, exact, 1e-3)  # first order in the step
     assert stepped.contact_impulse == pytest.approx(exact.contact_impulse, rel=2e-3)
     assert stepped.contacts_per_revolution == pytest.approx(exact.contacts_per_revolution, abs=0.51)
-
-
-def test_free_motion_is_the_steady_response():
-    """Out of reach nothing is left to err: the orbit is the full model's steady response (L11)."""
-    rig = read_rig("mokhtar2017")
-    model = assemble(rig)
-    record = simulate(rig, speed=150.0, clearance="3 mm", transient=200, revolutions=2)
-    response = steady_response(model, 150.0)
-    turned = np.exp(2j * np.pi * np.arange(512) / 256)
-    for name, degree in (("vertical", "v"), ("horizontal", "w")):
-        known = (response[model.rotor.index(model.output_node, degree)] * turned).real
-        assert getattr(record, name) == pytest.approx(known, abs=1e-8 * abs(known).max())
-    assert record.contact_impulse[0] == record.peak_contact_force[0] == record.contact_fraction[0] == 0.0
-    assert record.regime == 0
 
 
 @pytest.mark.parametrize("spin", [SPEED, -SPEED])
@@ -226,17 +182,6 @@ def test_no_touch_is_missed_and_none_is_made_up(spin, share):
         assert record.contacts_per_revolution[0] >= 0.5
         assert 0.0 < record.contact_fraction[0] < 0.05
         assert 0.0 < record.peak_contact_force[0] < 1.0
-
-
-def test_clearance_ratio_just_below_one_touches():
-    """In the steady state of the packaged rig, whose orbit is a circle."""
-    kept = {"transient": 150, "revolutions": 4, "keep": ()}
-    below, above = (
-        simulate("mokhtar2017", speed_ratio=0.75, clearance_ratio=ratio, **kept) for ratio in (0.9999, 1.0001)
-    )
-    assert below.contact_impulse[0] > 0.0
-    # On the way from rest the orbit overshoots and touches; 150 revolutions later that is forgotten.
-    assert above.contact_impulse[0] == 0.0
 
 
 @pytest.mark.parametrize("n_sample", [16, 20, 64, 1024, 4096])
@@ -279,49 +224,6 @@ def test_unusual_cases_agree_with_the_central_difference(rig, speed, clearance, 
     for name in ("contact_impulse", "contact_duration", "friction_work"):
         assert getattr(found, name) == pytest.approx(getattr(known, name), rel=1e-3), name
     assert found.minimum_slip_speed == pytest.approx(known.minimum_slip_speed, rel=0.01, nan_ok=True)
-
-
-@pytest.mark.parametrize("clearance", ["84 um", "100 um"])
-def test_energy_balances_in_the_steady_state(clearance):
-    record = simulate("mokhtar2017", speed_ratio=0.75, clearance=clearance, keep=())
-    assert record.period in (1, 2)
-    assert record.energy_residual < 1e-4
-
-
-def test_energy_residual_shows_damping_that_does_not_act(monkeypatch):
-    """The residual can fail: the loss taken for a hundredth more than it is."""
-    given = {"speed_ratio": 0.75, "clearance": "84 um", "transient": 60, "revolutions": 8, "keep": ()}
-    sound = simulate("mokhtar2017", **given)
-    usual = ModeLibrary.tables
-
-    def overdone(book):
-        tables = usual(book)
-        return tables._replace(loss=1.01 * tables.loss, steady_power=tables.steady_power * [1.01, 1.0])
-
-    monkeypatch.setattr(ModeLibrary, "tables", overdone)
-    assert simulate("mokhtar2017", **given).energy_residual > 10 * sound.energy_residual
-
-
-@pytest.mark.parametrize("normal", ["fixed", "updated"])
-def test_dry_whip_diverges_and_says_so(normal):
-    rig = read_rig("mokhtar2017")
-    around = tuple(replace(rig.stator[0], angle=2 * math.pi * i / 3, lateral=False) for i in range(3))
-    record = simulate(
-        replace(rig, stator=around),
-        speed=148.7,
-        clearance="20 um",
-        friction=0.8,
-        normal=normal,
-        transient=1,
-        revolutions=40,
-    )
-    assert record.status == DIVERGED
-    passed = r"the displacement of the rotor at node 8 passed 0.08 m|the mechanical energy passed 716 J, .*"
-    assert re.fullmatch(rf"({passed}|{NO_FORCES}) in revolution \d+", record.reason)
-    assert np.isnan(record.vertical[-1])
-    assert np.isnan(record.peak_contact_force).all()
-    assert record.period == -1
-    assert record.steps > 0
 
 
 METHODS = ({"method": "modal"}, {"method": "central-difference", "step": "2 us"})
@@ -425,28 +327,6 @@ def test_free_twist_is_refused_with_the_fix():
     with pytest.raises(InputError, match='method = "central-difference"'):
         simulate(free, **RUB)
     assert simulate(free, **RUB, method="central-difference", step="2 us").status == DONE
-
-
-@pytest.mark.parametrize("is_touching", [False, True])
-def test_run_goes_on_from_its_final_state(is_touching):
-    """Also amid a contact: two runs of a revolution are one of two, and no contact is counted twice."""
-    rig, given = trial_rig(2), RUB | {"transient": 0}
-    for phase in np.linspace(0, 2 * math.pi, 24):
-        turned = with_keys(rig, {"rotor.unbalance.phase": phase})
-        first = simulate(turned, **(given | {"revolutions": 1}))
-        if (first.final.contact_force.max() > 1.0) == is_touching:
-            break
-    assert (first.final.contact_force.max() > 1.0) == is_touching
-    whole = simulate(turned, **given)
-    second = simulate(turned, **(given | {"revolutions": 1}), initial=first.final)
-    for name in MOTIONS:
-        expected = getattr(whole, name)[..., 256:]
-        assert getattr(second, name) == pytest.approx(expected, rel=0, abs=1e-7 * abs(expected).max()), name
-    counts = first.contacts_per_revolution + second.contacts_per_revolution
-    assert counts == pytest.approx(2 * whole.contacts_per_revolution)
-    impulse = first.contact_impulse + second.contact_impulse
-    assert impulse == pytest.approx(2 * whole.contact_impulse, rel=1e-6)
-    assert first.contact_force.mean() * turn(SPEED) == pytest.approx(first.contact_impulse.mean(), rel=1e-3)
 
 
 @pytest.mark.parametrize("normal", ["fixed", "updated"])

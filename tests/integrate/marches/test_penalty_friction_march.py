@@ -9,7 +9,7 @@ from rubhpc import State, simulate
 from rubhpc.integrate import case
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
-from rubhpc.integrate.periodic_motions.saltation import by_clearance, monodromy
+from rubhpc.integrate.periodic_motions.saltation import by_clearance
 from rubhpc.integrate.scheme import Scheme
 from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, state_of
@@ -54,22 +54,6 @@ def test_energy_is_kept_where_slip_turns(damping):
     assert record.energy_residual < 1e-9
 
 
-def test_stiffer_springs_come_to_the_held_gap():
-    """Coulomb's law with multipliers is the limit; its error falls with the compliance of the spring."""
-    given = {"speed": 120.0, "clearance": "20 um", "friction": 0.2, "friction_law": "coulomb"}
-    given |= {"transient": 0, "revolutions": 1}
-    held = simulate(trial_rig(1), **given)
-    distance = [
-        abs(
-            simulate(trial_rig(1), **given, law="penalty", stiffness=k).contact_impulse[0]
-            - held.contact_impulse[0]
-        )
-        for k in (1e7, 1e9)
-    ]
-    assert held.contact_impulse[0] > 0.0
-    assert distance[1] < 0.1 * distance[0]
-
-
 @pytest.fixture(scope="module")
 def whipping():
     """Three revolutions of the whip, in which its pairs have begun to stick."""
@@ -84,31 +68,6 @@ def test_central_difference_is_the_same_motion(whipping):
     stepped = simulate(trial_rig(3), **given, method="central-difference", step="0.4 us")
     assert exact.stick_fraction.min() > 0.5
     assert largest_difference(exact, stepped) < 1e-3
-
-
-def test_run_goes_on_amid_stick(whipping):
-    given = WHIP | {"damping": 300.0, "transient": 0}
-    second = simulate(trial_rig(3), **given, revolutions=1, initial=whipping)
-    whole = simulate(trial_rig(3), **given, revolutions=4)
-    assert second.vertical == pytest.approx(whole.vertical[768:], abs=1e-7 * np.abs(whole.vertical).max())
-
-
-def test_monodromy_is_the_derivative_of_the_flow(whipping):
-    contact = Contact(**PENALTY, damping=300.0)
-    setup = prepare(trial_rig(3), 120.0, contact=contact, integrator=Integrator(), samples_per_revolution=64)
-    motion = PiecewiseMotion(setup, 20e-6, 0.6, whipping)
-    revolution = motion.revolve(motion.start, motion.states, share=0.3)
-    q = len(setup.model.stators)
-    assert any(state_of(piece.states, i) == STUCK for piece in revolution.pieces for i in range(q))
-    derivative = monodromy(motion, [revolution])
-    rng = np.random.default_rng(1)
-    for _ in range(3):
-        along = rng.standard_normal(motion.start.size)
-        along[: motion.n] /= setup.spin
-        step = 1e-8 * motion.size(motion.start) * along / motion.size(along)
-        ends = [motion.revolve(motion.start + sign * step, motion.states, share=0.3).end for sign in (1, -1)]
-        difference = 0.5 * (ends[0] - ends[1])
-        assert motion.size(difference - derivative @ step) < 1e-4 * motion.size(derivative @ step)
 
 
 @pytest.mark.parametrize("law", [PENALTY | {"damping": 300.0}, {"friction_law": "coulomb"}])

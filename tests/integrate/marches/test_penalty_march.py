@@ -3,14 +3,12 @@
 import numpy as np
 import pytest
 from record_distance import largest_difference
-from trial_rig import trial_rig
 
 import rubhpc
 from rubhpc import State, read_rig, simulate
 from rubhpc.integrate import case
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
-from rubhpc.integrate.periodic_motions.saltation import monodromy
 from rubhpc.integrate.scheme import Scheme
 from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.penalty_events import change_pressed, pressed_pairs
@@ -39,42 +37,6 @@ def test_short_steps_come_to_the_closed_form_as_they_are_halved(monkeypatch):
     assert distance[1] < 0.2 * distance[0]
 
 
-def test_central_difference_is_the_same_motion():
-    """All degrees of the mesh. Its step is of first order where the damper's force sets in: 6e-4 axially."""
-    given = HARD | {"transient": 0, "revolutions": 2, "clearance": "70 um"}
-    exact = simulate("mokhtar2017", **given)
-    stepped = simulate("mokhtar2017", **given, method="central-difference", step="1 us")
-    assert exact.contact_impulse[0] > 0.0
-    assert largest_difference(exact, stepped) < 1e-3
-    assert exact.peak_contact_force == pytest.approx(stepped.peak_contact_force, rel=1e-3)
-
-
-@pytest.mark.parametrize("damping", [0.0, 500.0])
-def test_ring_keeps_its_energy(damping):
-    given = {"speed": 170.0, "clearance": "40 um", "friction": 0.2, "transient": 1, "revolutions": 3}
-    record = simulate(trial_rig(3), law="penalty", stiffness=1e7, damping=damping, **given)
-    assert SCHEMES[record.scheme] == "event_driven"
-    assert record.contact_impulse.min() > 0.0
-    assert record.energy_residual < 1e-6
-
-
-def test_run_goes_on_amid_a_contact():
-    """What a pair overlaps, and whether it presses, follows from the state at the end of a run."""
-    given = HARD | {"transient": 0, "friction": 0.2}
-    for angle in np.linspace(0.0, 2 * np.pi, 33):
-        rig = with_keys(STIFF, {"rotor.unbalance.phase": angle})
-        first = simulate(rig, **given, revolutions=1)
-        if first.final.contact_force[0] > 1.0:
-            break
-    assert first.final.overlap[0] > 0.0
-    second = simulate(rig, **given, revolutions=1, initial=first.final)
-    whole = simulate(rig, **given, revolutions=2)
-    assert second.vertical == pytest.approx(whole.vertical[256:], abs=1e-9 * np.abs(whole.vertical).max())
-    assert second.contact_force[0] == pytest.approx(
-        whole.contact_force[0, 256:], abs=1e-6 * whole.peak_contact_force[0]
-    )
-
-
 def test_shooting_meets_the_motion_and_its_decay():
     """A touch jumps by the damper's force: without its saltation matrix the multipliers would be off."""
     given = {"speed_ratio": 0.75, "clearance": "100 um", "law": "penalty", "stiffness": 1e8, "damping": 2e3}
@@ -87,26 +49,6 @@ def test_shooting_meets_the_motion_and_its_decay():
     assert settled.largest_multiplier == pytest.approx(abs(solved.multipliers[0]), rel=1e-4)
     n = min(settled.vertical.size, solved.record.vertical.size)
     assert solved.record.vertical[:n] == pytest.approx(settled.vertical[:n], abs=1e-10)
-
-
-def test_monodromy_is_the_derivative_of_the_flow():
-    contact = Contact(law="penalty", stiffness=1e7, damping=2e3)
-    setup = prepare(
-        read_rig("mokhtar2017"), 300.0, contact=contact, integrator=Integrator(), samples_per_revolution=64
-    )
-    start = simulate("mokhtar2017", speed=300.0, clearance="90 um", transient=0, revolutions=5).final
-    motion = PiecewiseMotion(setup, 90e-6, 0.3, start)
-    revolution = motion.revolve(motion.start, motion.states)
-    assert len(revolution.pieces) > 2
-    derivative = monodromy(motion, [revolution])
-    rng = np.random.default_rng(1)
-    for _ in range(3):
-        along = rng.standard_normal(motion.start.size)
-        along[: motion.n] /= setup.spin
-        step = 1e-9 * motion.size(motion.start) * along / motion.size(along)
-        ends = [motion.revolve(motion.start + sign * step, motion.states).end for sign in (1, -1)]
-        difference = 0.5 * (ends[0] - ends[1])
-        assert motion.size(difference - derivative @ step) < 1e-4 * motion.size(derivative @ step)
 
 
 def test_states_follow_from_gap_and_force():

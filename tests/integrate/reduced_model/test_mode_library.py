@@ -289,10 +289,6 @@ def test_modes_of_a_ring_are_solved_when_first_met():
     assert all(library.add(mask) for mask in range(1, 8))
 
 
-def test_phase_is_found_by_its_set(case):
-    assert [find_mode(case.tables.mask, mask) for mask in (0, 1, 2, 3, 7)] == [0, 1, 2, 3, -1]
-
-
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 7, 8, 1023, 1024, 2**40 - 1])
 def test_longest_step_within_a_count_of_ticks(count):
     level = floor_log2(count)
