@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import sys
-import time
 from collections import Counter
 from dataclasses import replace
 from itertools import product
@@ -20,21 +19,13 @@ from test_laws import ROWS
 
 from postproc.signals import contacts
 from postproc.signals.hilbert_huang import hilbert_huang, median_frequency
-from rubhpc import LumpedStator, periodic, read_rig, simulate
-from rubhpc.integrate import tangent_motion
-from rubhpc.integrate.case import run_case
-from rubhpc.integrate.marches import friction as friction_march
+from rubhpc import LumpedStator, read_rig, simulate
 from rubhpc.integrate.periodic_motions.proof import Solver
-from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import with_keys
 from rubhpc.schema import DONE, REGIME
-from rubhpc.study.study import Contact, Integrator, Recording
-from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from rubhpc import Record, Rig
+    from rubhpc import Rig
 
 PACKAGED = read_rig("mokhtar2017")
 STIFF = with_keys(PACKAGED, {"stator.youngs_modulus": "30 GPa"})
@@ -232,94 +223,6 @@ def lasting() -> None:
         )
 
 
-def transients() -> None:
-    """Transients to equal errors of the orbit: direct, auto, given (guide, performance: the direct way)."""
-    most = 40_000
-    keep = {"samples_per_revolution": 64, "revolutions": 4, "keep": ("waveform",), "transient_limit": most}
-    rows = ((0.9, 0.523, 0.3), (1.3, 0.968, 0.269), (1.6, 0.74, 0.33), (3.0, 0.5, 0.2))
-    for alpha, (ratio, clearance, friction) in product((0.4, 0.8, 1.6, 4.0), rows):
-        case: dict[str, Any] = {
-            "rig": with_keys(PACKAGED, {"rotor.damping.alpha": alpha}), "speed_ratio": ratio,
-            "clearance_ratio": clearance, "friction": friction,
-        }  # fmt: skip
-
-        def run(case: dict[str, Any] = case, **transient: Any) -> Record:
-            kept = keep if isinstance(transient["transient"], str) else keep | {"transient_limit": None}
-            return simulate(**case, **kept, **transient)
-
-        def timed(rounds: int, run: Callable[..., Record] = run, **transient: Any) -> float:
-            spent = []
-            for _ in range(rounds):
-                began = time.process_time()
-                run(**transient)
-                spent.append(time.process_time() - began)
-            return 1e3 * min(spent)
-
-        direct = run(transient="direct")
-        exact = periodic(**case, period=direct.period, initial=direct.final, samples_per_revolution=64).record
-
-        def error(record: Record, exact: Record = exact) -> float:
-            return min(
-                max(
-                    np.abs(record.signals[name] - np.resize(np.roll(exact.signals[name], 64 * k), 256)).max()
-                    / np.ptp(exact.signals[name])
-                    for name in ("vertical", "horizontal")
-                )
-                for k in range(exact.period)
-            )
-
-        cost = timed(15, transient="direct")
-        alone = timed(15, transient=0, initial=direct.final)  # its record and proof, which nothing can save
-        print(
-            f"alpha {alpha}, r {ratio}: period {direct.period}, direct {cost:.1f} ms, {error(direct):.1e}; "
-            f"without a transient {alone:.1f} ms"
-        )
-        for tolerance in (1e-9, 3e-9, 1e-8):  # as near as events are resolved
-            settled = run(transient="auto", transient_tolerance=tolerance)
-            if settled.transient_revolutions < most:
-                break
-        trials = [(error(settled), tolerance, settled)]
-        for wanted in (1e-3, 1e-6):
-            for tolerance in (m * 10.0**-k for k in range(2, 12) for m in (3, 1)):
-                found = run(transient="auto", transient_tolerance=tolerance)
-                if error(found) <= wanted:
-                    trials.append((wanted, tolerance, found))
-                    break
-        for wanted, tolerance, found in trials:
-            auto = timed(3, transient="auto", transient_tolerance=tolerance)
-            n = found.transient_revolutions
-            while n > 8 and error(run(transient=int(0.95 * n))) <= wanted:
-                n = int(0.95 * n)
-            print(
-                f"    to {wanted:.1e}: auto {tolerance:.0e}, {found.transient_revolutions} revolutions, "
-                f"{auto:.1f} ms, {auto / cost:.1f} times, at most {auto / alone:.1f}; "
-                f"{n} given, {timed(3, transient=n) / cost:.1f} times"
-            )
-
-
-def default_accuracy() -> None:
-    """Distance of the modal scheme from the central difference (guide, performance: accuracy)."""
-    soft = PACKAGED
-    rows = [
-        ("r 0.75, 3 GPa, 84 um", soft, 0.75, {"clearance": "84 um"}),
-        ("r 0.75, 3 GPa, 100 um", soft, 0.75, {"clearance": "100 um"}),
-        ("r 3, 3 GPa, 76 um", soft, 3.0, {"clearance": "76 um"}),
-        ("r 2, 30 GPa, 90 um", STIFF, 2.0, {"clearance": "90 um"}),
-        ("r 1.7, 30 GPa, cg 0.70", STIFF, 1.7, {"clearance_ratio": 0.7}),
-        ("r 5.3, 30 GPa, cg 0.70", STIFF, 5.3, {"clearance_ratio": 0.7}),
-    ]
-    for name, rig, ratio, clearance in rows:
-        case: dict[str, Any] = {"speed_ratio": ratio, "friction": 0.3, "transient": 60, "revolutions": 6}
-        own = simulate(rig, **case, **clearance)
-        other = simulate(rig, **case, **clearance, method="central-difference", step=0.25e-6)
-        off = []
-        for signal in ("vertical", "torsion", "stator_axial", "stator_lateral"):
-            a, b = (np.asarray(getattr(record, signal), float) for record in (own, other))
-            off.append(np.sqrt(np.mean((a - b) ** 2)) / b.std())
-        off.append(abs(own.peak_contact_force[0] / other.peak_contact_force[0] - 1.0))
-        print(f"| {name} (P{own.period}) | {' | '.join(f'{x:.0e}' for x in off)} |")
-
-
 def distance(record: Any, known: Any) -> float:
     """Largest rms difference of a displacement or force over its rms about the mean."""
     seen = ("vertical", "horizontal", "torsion", "stator_axial", "stator_lateral", "contact_force")
@@ -395,44 +298,6 @@ def signals() -> None:
             )
 
 
-@on_one_thread
-def whip() -> None:
-    """Where the time of the dry whip of three stators goes (guide, performance): least of ten, ms."""
-    whipping = ring(STIFF.stator[0], 3)
-    coulomb, law = Contact(**COULOMB), {"clearance": 20e-6, "friction": 0.3}
-    setup = prepare(
-        whipping,
-        0.98 * 2.0 * math.pi * 31.5596,
-        contact=coulomb,
-        integrator=Integrator(),
-        samples_per_revolution=256,
-    )
-    recording = Recording(transient=60, revolutions=33, samples_per_revolution=256, keep=())
-    spent: Counter[str] = Counter()
-
-    def timed(module: Any, name: str, part_of: Callable[[tuple[Any, ...]], str]) -> None:
-        kernel = getattr(module, name)
-
-        def call(*given: Any) -> Any:
-            began = time.process_time()
-            found = kernel(*given)
-            spent[part_of(given)] += time.process_time() - began
-            return found
-
-        setattr(module, name, call)
-
-    timed(friction_march, "advance_friction", lambda given: "recorded" if given[5] else "transient")
-    timed(tangent_motion, "carry_along", lambda given: "tangent")
-    rounds = []
-    for _ in range(11):
-        spent.clear()
-        began = time.process_time()
-        run_case(setup, **law, recording=recording)
-        rounds.append({**spent, "all": time.process_time() - began})
-    least = {part: min(one[part] for one in rounds[1:]) for part in rounds[0]}
-    print(", ".join(f"{part} {1e3 * seconds:.0f}" for part, seconds in least.items()))
-
-
 if __name__ == "__main__":
     known = [
         closed_form,
@@ -443,12 +308,9 @@ if __name__ == "__main__":
         short_records,
         settling,
         lasting,
-        transients,
-        default_accuracy,
         accuracy_of_laws,
         growth,
         signals,
-        whip,
     ]
     for function in known:
         if len(sys.argv) == 1 or function.__name__ in sys.argv[1:]:

@@ -1,12 +1,11 @@
-"""What else one could use: the paper's scheme with NumPy, the same compiled, and ROSS's rubbing fault.
+"""What else one could use: the paper's scheme with NumPy, and the same compiled.
 
-The first two follow Eqs. 20 to 24 of the paper, dense over both bodies together, for one upright stator.
+Both follow Eqs. 20 to 24 of the paper, dense over both bodies together, for one upright stator.
 """
 
 import math
 import time
 from dataclasses import dataclass
-from importlib.util import find_spec
 
 import numba
 import numpy as np
@@ -89,50 +88,3 @@ def run(rig, speed, clearance, friction, n_step, *, step, is_compiled):
     began = time.perf_counter()
     function(*given, scheme.vertical, clearance, speed * step, n_step, vertical)
     return (time.perf_counter() - began) / n_step, vertical
-
-
-def ross_rotor(rig):
-    """The rotor of a rig with one shaft section and one disc, as ROSS has it."""
-    import ross
-
-    (section,), (disc,) = rig.rotor.shaft, rig.rotor.disc
-    steel = ross.Material(
-        name="shaft", rho=section.density, E=section.youngs_modulus, G_s=section.shear_modulus
-    )
-    shaft = [
-        ross.ShaftElement(section.length / section.elements, 0.0, section.outer_diameter, material=steel)
-        for _ in range(section.elements)
-    ]
-    mass = disc.density * math.pi * disc.diameter**2 / 4 * disc.thickness
-    polar = mass * disc.diameter**2 / 8
-    disk = ross.DiskElement(disc.node - 1, mass, 0.5 * polar + mass * disc.thickness**2 / 12, polar)
-    bearings = [
-        ross.BearingElement(b.node - 1, kxx=b.stiffness, kyy=b.stiffness, cxx=0.0) for b in rig.rotor.bearing
-    ]
-    return ross.Rotor(shaft, [disk], bearings)
-
-
-def ross_rubbing(rig, speed, clearance, friction, duration, step):
-    """Wall time (s) of ROSS's rubbing fault over `duration` (s); None where ROSS is not installed.
-
-    Penalty contact all around at one node against a rigid housing; its friction is not Coulomb's. No
-    flexible stator, no sweeps.
-    """
-    if find_spec("ross") is None:
-        return None
-    rotor, (disc,), (unbalance,), stator = ross_rotor(rig), rig.rotor.disc, rig.rotor.unbalance, rig.stator[0]
-    began = time.perf_counter()
-    rotor.run_rubbing(
-        n=disc.node - 1,
-        distance=clearance,
-        contact_stiffness=stator.youngs_modulus * stator.width * stator.height / stator.length,
-        contact_damping=0.0,
-        friction_coeff=friction,
-        torque=True,
-        node=[unbalance.node - 1],
-        unbalance_magnitude=[unbalance.mass * unbalance.radius],
-        unbalance_phase=[0.0],
-        speed=speed,
-        t=np.arange(0.0, duration, step),
-    )
-    return time.perf_counter() - began
