@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from typing import TYPE_CHECKING
-from weakref import WeakKeyDictionary
+from weakref import WeakKeyDictionary, ref
 
 import numpy as np
 
@@ -51,7 +51,7 @@ class SpeedRanges:
     """
 
     def __init__(self, fastest: ModalSetup) -> None:
-        self._fastest = fastest
+        self._of = ref(fastest)  # `Ripples`, which are kept by set-up, would keep it forever
         self._basis = fastest.reduced.basis
         self.accelerations: tuple[float, float] | None = None  # rad/s^2, least and greatest to come
         model = fastest.model
@@ -66,6 +66,13 @@ class SpeedRanges:
             self._turning = fastest.free_spin.share @ self._basis[:n]
         phasor = (model.unbalance_cosine - 1j * model.unbalance_sine) @ self._basis[:n]
         self.phasor = phasor.astype(np.complex128)
+
+    @property
+    def _fastest(self) -> ModalSetup:
+        """The set-up at the highest speed, which `Pieces` hold."""
+        fastest = self._of()
+        assert fastest is not None
+        return fastest
 
     def hold(
         self, speed: float, acceleration: float, slope: float, guess: float | None = None
@@ -176,11 +183,12 @@ class SpeedRanges:
         """The range in which modes follow the speed."""
 
         def matrices(at: float) -> tuple[Floats, Floats]:
-            rotor = fastest.model.rotor.at(self._tabulated(at))  # whose sag is not asked for
-            damping, stiffness = self._system(replace(fastest.model, rotor=rotor), at, acceleration, 0.0)
+            rotor = model.rotor.at(self._tabulated(at))  # whose sag is not asked for
+            damping, stiffness = self._system(replace(model, rotor=rotor), at, acceleration, 0.0)
             return stiffness, damping
 
         fastest = self._fastest
+        model = fastest.model
         seen = self.linear(speed, is_whole=True).seen
         rotor = rotor_of(self._fastest, matrices, self.phasor, seen)
         widest = self._widest(speed, acceleration)

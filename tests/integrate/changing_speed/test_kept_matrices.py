@@ -1,5 +1,6 @@
 """Memory of the matrices of a run-up or drive is bounded, however many ranges of speed it passes."""
 
+import gc
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 from overhung_pump import pump
 from test_run_up_machines import TIPS
 
-from rubhpc import run_up
+from rubhpc import recent, run_up
 from rubhpc.integrate.changing_speed import pieces, speed_ranges
 
 DRIVE = {"torque": "60 N m", "start": "300 rad/s", "revolutions": 5, "inertia": "0.02 kg m^2"}
@@ -46,3 +47,13 @@ def test_memory_of_many_ranges_is_bounded(motion, budget, monkeypatch):
     for other in (again, found):
         for name in ("vertical", "torsion", "speed"):
             assert np.array_equal(other[name].values, first[name].values), name
+
+
+def test_what_is_kept_of_a_set_up_goes_with_it():
+    """Hundreds of megabytes of a machine, in a process that computes other ones after it."""
+    run_up(replace(pump(), stator=TIPS), clearance=1e-4, friction=0.05, samples_per_revolution=64, **BENDS)
+    kept = pieces._KNOWN, pieces._RIPPLES, speed_ranges._DESKS
+    assert all(kept)
+    recent.forget()
+    gc.collect()
+    assert not any(kept)
