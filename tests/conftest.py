@@ -131,7 +131,6 @@ LONG = (
     "faults/test_damage.py::test_what_is_no_case_is_written_anew_without_computing[period]",
     "faults/test_damage.py::test_what_is_no_case_is_written_anew_without_computing[revolution]",
     "faults/test_damage.py::test_what_is_no_case_is_written_anew_without_computing[status]",
-    "faults/test_refined_kills.py::test_kills_of_workers",
     "faults/test_small_disk.py",
     "faults/test_stops.py::test_a_signal_stops_a_run[2-0]",
     "faults/test_stops.py::test_the_file_stop_stops_all_ranks",

@@ -6,7 +6,6 @@ from functools import partial
 import numpy as np
 import pytest
 import running
-from running import check_a_lost_chunk
 
 import rubhpc
 from postproc.figures.bifurcation import bifurcation
@@ -15,8 +14,6 @@ from postproc.figures.map import map as map_figure
 from postproc.figures.speed import speed
 from postproc.report.page import Page
 from rubhpc.errors import InputError
-from rubhpc.running.recompute import reproduce
-from rubhpc.storage.store import Store
 from rubhpc.study.cases import CaseGrid
 
 STUDY = """
@@ -79,15 +76,6 @@ def test_a_record_ends_where_the_spin_is_too_slow(folder):
     assert np.isnan(store.speed.values[0, 1, turned[0, 1] :]).all()
     assert (store.last_speed.values[0] <= 50.0 * math.pi).all()
     assert (store.status.values == 1).all()
-
-
-def test_a_resumed_study_has_the_same_bytes(folder, tmp_path):
-    check_a_lost_chunk(folder / "driven.zarr", study_of(tmp_path, STUDY), "revolution_braking_torque")
-
-
-def test_one_case_is_computed_again(folder):
-    name = Store(folder / "driven.zarr").manifest.case_id(3)
-    assert "holds the same, bit for bit" in reproduce(study_of(folder, STUDY), name).verdict
 
 
 def test_a_case_does_not_depend_on_the_others_of_its_study(folder, tmp_path):
@@ -180,16 +168,3 @@ def test_speeds_of_several_torques_are_laid_over_one_another(folder):
     top, bottom = speed(store, over="drive_torque").show()
     assert len([line for line in top.lines if "drive torque" in line.get_label()]) == 2
     assert bottom.lines[1].get_ydata()[0] == pytest.approx(-5.0)
-
-
-@pytest.mark.serial
-def test_workers_write_the_same_bytes(folder, tmp_path):
-    rubhpc.run(study_of(tmp_path, STUDY), quiet=True, workers=2)
-    chunks = [
-        path.relative_to(folder)
-        for path in (folder / "driven.zarr").rglob("*")
-        if path.is_file() and "c" in path.parts and "wall_time" not in path.parts
-    ]
-    assert len(chunks) > 100
-    for chunk in chunks:
-        assert (tmp_path / chunk).read_bytes() == (folder / chunk).read_bytes(), chunk

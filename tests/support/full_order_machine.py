@@ -1,9 +1,9 @@
 """A driven machine of discs, stators and a carrier by Dormand and Prince's method, derived by itself.
 
 The absolute angles of all discs and of the driven end are coordinates; each unbalance turns with its own
-disc. Lagrange's equations of
+disc, and the first may tilt. Lagrange's equations of
 
-    T = u' M u' / 2 + sum(I_j a_j'^2 / 2 + a_j' (Re[i p_j exp(i a_j)] u' - u G_j u' / 2)) + D d'^2 / 2
+    T = u' M u' / 2 + sum(I_j a_j'^2 / 2 + a_j' Re[i p_j exp(i a_j)] u') - a_1' u G u' / 2 + D d'^2 / 2
 
 are solved for the accelerations. Penalties act between one disc and its ring of stators; friction slides
 steadily.
@@ -18,9 +18,9 @@ from scipy.integrate import solve_ivp
 
 @dataclass
 class Machine:
-    """Lateral degrees are v and w of disc 1, v and w of disc 2, and so on."""
+    """Lateral degrees are v and w of disc 1, v and w of disc 2, and so on, then tilts if there are any."""
 
-    mass: np.ndarray  # (2 n, 2 n), of n discs
+    mass: np.ndarray  # (n_lateral, n_lateral), of n discs
     damping: np.ndarray
     stiffness: np.ndarray
     polar: np.ndarray  # (n,), kg m^2
@@ -35,19 +35,21 @@ class Machine:
     penalty_damping: float
     drive_inertia: float
     torque: object  # of the speed, N m
-    load: np.ndarray | None = None  # (2 n,), N
-    bearings: object = None  # of the speed: stiffness and damping (2 n, 2 n) besides
+    load: np.ndarray | None = None  # (n_lateral,), N
+    gyroscopic: np.ndarray | None = None  # (n_lateral, n_lateral), of the first disc
+    bearings: object = None  # of the speed: stiffness and damping (n_lateral, n_lateral) besides
     carrier: tuple | None = None  # mass, stiffness and damping, in both directions
 
 
 def driven_machine(machine, *, start, n_revolution, per_revolution, rtol=1e-6):
     """Samples locked to the mean angle: time, speed, and v, w and twist of the rubbed disc by rows.
 
-    Then the work of friction, J, and the torque impulses of drive and friction on rotor and drive, N m s.
+    Then the work of friction, J, the torque impulses of drive and friction on rotor and drive, N m s, and
+    the work of the drive, J.
     """
     m = machine
     n, q = len(m.mass), len(m.stators)
-    n_disc = n // 2
+    n_disc = len(m.polar)
     angles = slice(n, n + n_disc)
     end, tips = n + n_disc, slice(n + n_disc + 1, n + n_disc + 1 + q)
     sides = slice(tips.stop, tips.stop + (q if m.carrier else 0))  # lateral motion of the tips
@@ -59,6 +61,7 @@ def driven_machine(machine, *, start, n_revolution, per_revolution, rtol=1e-6):
         np.array([getattr(s, name) for s in m.stators]) for name in ("mass", "stiffness", "damping")
     )
     lateral_spring = np.array([s.lateral_stiffness or 0.0 for s in m.stators])
+    gyroscopic = np.zeros((n, n)) if m.gyroscopic is None else m.gyroscopic
     radius = m.stators[0].radius
     total = m.polar.sum() + m.drive_inertia
     rub = slice(2 * m.rubbed, 2 * m.rubbed + 2)
@@ -83,6 +86,7 @@ def driven_machine(machine, *, start, n_revolution, per_revolution, rtol=1e-6):
         pressed = np.maximum(-m.penalty * gap - m.penalty_damping * opening, 0.0) * (gap < 0.0)
         mass = inertia.copy()
         mass[angles, :n] = (1j * turned).real
+        mass[n, :n] += 0.5 * gyroscopic @ x[:n]
         mass[:n, angles] = mass[angles, :n].T
         f = np.zeros(size)
         stiffness, damping = m.stiffness, m.damping
@@ -90,6 +94,7 @@ def driven_machine(machine, *, start, n_revolution, per_revolution, rtol=1e-6):
             k, c = m.bearings(spin)
             stiffness, damping = stiffness + k, damping + c
         f[:n] = -stiffness @ x[:n] - damping @ v[:n] + (v[angles] ** 2) @ turned.real
+        f[:n] -= v[n] * gyroscopic @ v[:n]
         if m.load is not None:
             f[:n] += m.load
         f[rub] -= pressed @ (axis + m.friction * along)
@@ -110,9 +115,9 @@ def driven_machine(machine, *, start, n_revolution, per_revolution, rtol=1e-6):
             f[base] -= m.carrier[1] * x[base] + m.carrier[2] * v[base]
         slip = radius * v[n + m.rubbed] + along @ v[rub] - (v[sides] if m.carrier else 0.0)
         lost = m.friction * pressed @ slip
-        return np.concatenate([v, np.linalg.solve(mass, f), [lost, given, braking]])
+        return np.concatenate([v, np.linalg.solve(mass, f), [lost, given, braking, given * v[end]]])
 
-    y = np.zeros(2 * size + 3)
+    y = np.zeros(2 * size + 4)
     stiffness = m.stiffness if m.bearings is None else m.stiffness + m.bearings(start)[0]
     y[:n] = np.linalg.solve(stiffness, np.zeros(n) if m.load is None else m.load)
     twist = -np.linalg.solve(m.torsion, m.polar) * m.torque(start) / total
@@ -145,4 +150,4 @@ def driven_machine(machine, *, start, n_revolution, per_revolution, rtol=1e-6):
         times = times - (mean(at, 0) - wanted) / mean(at, size)
     at = part.sol(times)
     rows = np.array([*at[rub], at[n + m.rubbed] - at[end]])
-    return times, mean(at, size), rows, part.y[-3:, -1]
+    return times, mean(at, size), rows, part.y[-4:, -1]

@@ -101,7 +101,7 @@ LONG = (
 def test_a_machine_meets_full_order_stepping(n, keys):
     """The twist departs: the reference feels in it how its unbalance whirls (docs/theory/drive.md)."""
     rig, reference = machine(**keys)
-    time, speed, rows, (lost, given, braking) = driven_machine(
+    time, speed, rows, (lost, given, braking, _) = driven_machine(
         reference, start=START, n_revolution=n, per_revolution=PER_REVOLUTION
     )
     found = run_up(

@@ -1,4 +1,4 @@
-"""Studies of branches, run-ups and drives are killed on their way, again and again: the bytes stay."""
+"""Studies of each kind are killed on their way, again and again, on workers and ranks: the bytes stay."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ import time
 import pytest
 from running import run, start, stored_bytes
 
+from rubhpc.schema import INFERRED
+from rubhpc.storage.status import read_status
 from rubhpc.storage.verify import verify
 
 BRANCHES = """
@@ -60,16 +62,32 @@ samples_per_revolution = 64
 [run]
 block = 1
 """
+REFINED = """
+rig = "mokhtar2017"
+[grid]
+speed_ratio = { start = 0.9, stop = 2.0, num = 9 }
+clearance_ratio = [0.7, 0.85]
+friction = { start = 0.0, stop = 0.4, num = 9 }
+[refine]
+coarse = 4
+[record]
+transient = 5
+revolutions = 2
+samples_per_revolution = 32
+keep = ["section"]
+"""
+SLABS = REFINED.replace("coarse = 4", 'coarse = 4\naxes = ["friction"]')
+KINDS = {"branches": BRANCHES, "run_ups": RUN_UPS, "drives": DRIVES, "refined": REFINED, "slabs": SLABS}
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("how", [{"options": ("--workers", "2")}, {"ranks": 2}], ids=["workers", "ranks"])
-@pytest.mark.parametrize("text", [BRANCHES, RUN_UPS, DRIVES], ids=["branches", "run_ups", "drives"])
-def test_kills_leave_the_same_bytes(tmp_path, text, how):
+@pytest.mark.parametrize("kind", KINDS)
+def test_kills_leave_the_same_bytes(tmp_path, kind, how):
     options, under = how.get("options", ()), {"ranks": how.get("ranks", 0)}
     whole, study, store = (tmp_path / name for name in ("whole.toml", "killed.toml", "killed.zarr"))
     for path in (whole, study):
-        path.write_text(f'title = "killed"\noutput = "{path.with_suffix(".zarr")}"\n{text}')
+        path.write_text(f'title = "killed"\noutput = "{path.with_suffix(".zarr")}"\n{KINDS[kind]}')
     began = time.monotonic()
     assert run(whole).returncode == 0
     taken = time.monotonic() - began
@@ -89,4 +107,5 @@ def test_kills_leave_the_same_bytes(tmp_path, text, how):
         assert not verify(store)
     assert n_killed
     assert run(study, *options, **under).returncode == 0
+    assert read_status(store).counts[INFERRED] > 0 or "refine" not in KINDS[kind]
     assert stored_bytes(store) == stored_bytes(tmp_path / "whole.zarr")
