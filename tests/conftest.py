@@ -119,7 +119,6 @@ SLOW = (
     "study/test_sampling.py::test_points_that_a_library_draws_otherwise",
     "study/test_stored_state.py",
     "study/test_study.py::test_a_range_includes_its_stop_whatever_the_rounding",
-    "study/test_study.py::test_no_slip_of_the_pen_gets_past_as_a_traceback",
     "study/test_warnings.py::test_unstable_speeds_are_named_once_and_have_no_amplitude",
     "validation/",
 )

@@ -14,7 +14,7 @@ from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import steady_response
 from rubhpc.integrate.packing import degrees_of, output_degrees
 from rubhpc.integrate.reduced_model.coupling import Grouped, coupled_rows
-from rubhpc.integrate.reduced_model.reduction import directions, reduce_model
+from rubhpc.integrate.reduced_model.reduction import reduce_model
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL
 from rubhpc.rig.parts import Damping, Torsion
 
@@ -46,15 +46,6 @@ def full_answer(model, frequency, spin):
 def reduced_answer(reduced, frequency):
     system = reduced.stiffness - frequency**2 * np.eye(len(reduced.stiffness))
     return rows_of(reduced) @ np.linalg.solve(system + 1j * frequency * reduced.damping, rows_of(reduced).T)
-
-
-@pytest.mark.parametrize("accuracy", [1e-2, 1e-3, 1e-5, FULL])
-def test_coordinates_have_unit_mass(accuracy):
-    model = assemble(trial_rig(2))
-    reduced = reduce_model(model, SPIN, accuracy)
-    found = reduced.basis.T @ reduced.mass @ reduced.basis
-    assert found == pytest.approx(np.eye(len(found)), abs=1e-8)
-    assert np.array_equal(reduced.mass, whole(model, SPIN)[0])
 
 
 @pytest.mark.parametrize("accuracy", [1e-1, 1e-3])
@@ -129,35 +120,6 @@ def exponents(mass, damping, stiffness):
     zero, one = np.zeros_like(mass), np.eye(len(mass))
     rate = [[zero, one], [-np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, damping)]]
     return eigvals(np.block(rate))
-
-
-@pytest.mark.parametrize("spin", [SPIN, -SPIN])
-def test_directions_of_gap_force_and_slip(spin):
-    """In the complex plane: a motion's gap and slip, and the work of a unit contact on it."""
-    friction = 0.35
-    model = assemble(trial_rig(3))
-    reduced = reduce_model(model, spin, 1e-3)
-    gap_jacobian, force_direction, friction_direction = directions(reduced, model, friction)
-    rng = np.random.default_rng(1)
-    x = rng.normal(size=gap_jacobian.shape[1])
-    sense = np.sign(spin)
-    for i, stator in enumerate(model.stators):
-        v, w, twist, axial, lateral = reduced.degree[i] @ x
-        axis = np.exp(1j * stator.angle)
-        apart = (axial + 1j * lateral) * axis - (v + 1j * w)  # the tip's motion less the disc's
-        assert gap_jacobian[i] @ x == pytest.approx((apart / axis).real)
-        sliding = sense * (stator.radius * twist - (apart / (1j * axis)).real)
-        assert friction_direction[i] @ x == pytest.approx(sliding)
-        on_disc = -axis * (1 + 1j * sense * friction)
-        work = (on_disc.conj() * -apart).real - sense * friction * stator.radius * twist
-        assert force_direction[i] @ x == pytest.approx(work)
-
-
-def test_stator_without_lateral_freedom_has_no_lateral_row():
-    model = assemble(trial_rig(2, lateral=False))
-    reduced = reduce_model(model, SPIN, 1e-3)
-    assert not reduced.degree[:, LATERAL].any()
-    assert reduced.degree[:, AXIAL].any(axis=1).all()
 
 
 @pytest.mark.parametrize("alpha", [0.0, 25.0])

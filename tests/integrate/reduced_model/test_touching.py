@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from rubhpc.integrate.reduced_model.contact_mode import solve_contact_mode
-from rubhpc.integrate.reduced_model.energy_forms import energies_of
 from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs, mask_of, solve_friction_mode
 from rubhpc.integrate.reduced_model.mode_tables import Spared, tabulate
 from rubhpc.integrate.reduced_model.penalty_mode import Penalty
@@ -113,18 +112,6 @@ def test_what_touches_moves_alone(bodies, law, states):
         assert found.shape == expected.shape
         size = abs(expected).max(initial=1e-300)
         assert abs(found - expected).max(initial=0.0) < 1e-9 * size
-
-
-@pytest.mark.parametrize("law", ["sliding", "penalty", "friction"])
-@pytest.mark.parametrize("states", STATES)
-def test_parts_have_the_energies_of_the_whole(bodies, law, states):
-    (_, mode), among, closed, reduced, (_, friction) = solved(bodies, law, states)
-    whole = energies_of(mode, reduced, friction, WIDTH)
-    by_parts = among.energies(mode, reduced, friction, closed, WIDTH)
-    assert whole.loss.any()
-    for found, expected in zip(by_parts, whole, strict=True):
-        size = abs(expected).max()
-        assert found == pytest.approx(expected, rel=1e-12, abs=1e-14 * size)
 
 
 @pytest.mark.parametrize("law", ["sliding", "friction"])
