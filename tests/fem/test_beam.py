@@ -9,7 +9,6 @@ from rubhpc.fem.beam import (
     ROTOR_DEGREES,
     bar,
     bending,
-    join,
     rotor_elements,
     shear_coefficient_circle,
     shear_coefficient_rectangle,
@@ -123,29 +122,6 @@ def test_matrices_do_not_change_when_the_axes_turn_about_the_shaft(section):
         turn[rows, rows] = [[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]
     for matrix in (element.mass, element.gyroscopic, element.stiffness):
         assert turn @ matrix @ turn.T == pytest.approx(matrix, abs=1e-12 * np.abs(matrix).max())
-
-
-def test_mass_and_stiffness_are_symmetric_and_gyroscopic_matrix_is_skew():
-    element = element_of(SECTIONS["hollow"])
-    assert np.array_equal(element.mass, element.mass.T)
-    assert np.array_equal(element.stiffness, element.stiffness.T)
-    assert np.array_equal(element.gyroscopic, -element.gyroscopic.T)
-    assert np.abs(element.gyroscopic).max() > 0.0
-
-
-def test_sections_are_cut_into_equal_elements():
-    whole = SECTIONS["solid"]
-    cut = ShaftSection(length=2 * LENGTH, outer_diameter=0.05, elements=2, **STEEL)
-    assert element_of(cut).mass == pytest.approx(element_of(whole).mass)
-
-
-def test_joined_elements_share_their_node():
-    first, second = element_of(SECTIONS["solid"]), element_of(SECTIONS["hollow"])
-    joined = join([first, second])
-    assert joined.mass.shape == (18, 18)
-    shared = joined.stiffness[6:12, 6:12]
-    assert shared == pytest.approx(first.stiffness[6:, 6:] + second.stiffness[:6, :6])
-    assert np.all(joined.gyroscopic[:6, 12:] == 0.0)
 
 
 def test_shear_coefficients_of_circles_and_rectangles():
