@@ -157,18 +157,6 @@ def test_an_interference_pushes_the_shaft_onto_another_stator():
     assert record.contact_force[:, -1] == pytest.approx(known, rel=1e-4)
 
 
-@pytest.mark.parametrize("rig", [ALIGNED, around(LIGHT, 0.0, 2.0, 4.0)])
-@pytest.mark.parametrize("normal", ["fixed", "updated"])
-def test_a_case_goes_on_from_its_end(rig, normal):
-    case = CASE | {"clearance": "-20 um", "normal": normal}
-    whole = simulate(rig, **case | {"revolutions": 3})
-    first = simulate(rig, **case | {"revolutions": 2})
-    rest = simulate(rig, **case | {"revolutions": 1}, initial=first.final)
-    assert whole.energy_residual < 1e-5
-    assert (whole.contact_fraction > 0.3).all()
-    assert rest.vertical == pytest.approx(whole.vertical[2 * 256 :], abs=1e-5 * np.ptp(whole.vertical))
-
-
 def test_an_interference_with_a_wall_or_of_a_ratio_is_refused_in_one_line():
     wall = replace(LIGHT, stator=(LumpedStator(node=8, rigid=True),))
     with pytest.raises(

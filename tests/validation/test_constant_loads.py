@@ -19,13 +19,10 @@ from rubhpc import (
     simulate,
 )
 from rubhpc.fem.assemble import model_at
-from rubhpc.fem.statics import sag_at_stators
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.initial_state import at_rest
-from rubhpc.integrate.packing import degrees_of
 from rubhpc.integrate.record import State
 from rubhpc.integrate.setup import prepare
-from rubhpc.kernels.contact_pairs import normal_and_gap
 from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.rig.parts import Bearing, ShaftSection
 from rubhpc.rig.reading import with_keys
@@ -84,23 +81,6 @@ def test_motion_without_contact_is_the_sag_and_the_unbalance_response(method):
     assert loaded.spectrum_vertical[1:] == pytest.approx(light.spectrum_vertical[1:], abs=1e-16)
 
 
-def test_gap_is_that_of_the_whole_displacement():
-    """Stators all around, fixed and updated normal: motion counted from the sag, or from the centre."""
-    rig = heavy()
-    rig = replace(rig, stator=tuple(replace(rig.stator[0], angle=angle) for angle in (0.0, 0.9, 2.0, 4.0)))
-    model = assemble(rig)
-    nearer, aside = sag_at_stators(model)
-    rng = np.random.default_rng(3)
-    for i, (stator, row) in enumerate(zip(model.stators, degrees_of(model), strict=True)):
-        axis = np.cos(stator.angle), np.sin(stator.angle)
-        at = rng.normal(scale=1e-4, size=5)
-        whole = at + np.pad(model.sag[row[:2]], (0, 3))
-        for is_updated in (False, True):
-            from_sag = normal_and_gap(*axis, stator.radius, 2e-4 - nearer[i], aside[i], is_updated, at)
-            from_centre = normal_and_gap(*axis, stator.radius, 2e-4, 0.0, is_updated, whole)
-            assert from_sag == pytest.approx(from_centre, abs=1e-15)
-
-
 def oscillator(method, contact, load, per_revolution=2000):
     """A mass of 1 kg on a spring of 1 N/m under a load, above a wall."""
     given = body(1.0, 1.0, ((1, "v"),)), [WALL], 0.5, per_revolution, contact
@@ -143,33 +123,6 @@ def test_bounces_under_a_load_die_out_on_the_wall(method):
     assert rises == pytest.approx(-2.0 + math.sqrt(1.0 + 3.0 / 4.0), abs=1e-4)
     assert record.vertical[-2000:] == pytest.approx(np.full(2000, -1.0), abs=1e-6)
     assert record.contact_force[0, -2000:] == pytest.approx(np.full(2000, 1.0), rel=1e-3)
-
-
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("normal", ["fixed", "updated"])
-def test_shaft_at_rest_on_a_stator_stays_there(method, normal):
-    """Rotor and stator share the sag as two springs do, and nothing moves from there."""
-    rig = heavy(**{"stator.angle": math.pi, "rotor.unbalance.mass": 0.0})
-    gap, sag = 1e-4, -sag_at(rig, 8)
-    step = 1e-6 if method == "central-difference" else None
-    setup = prepare(
-        rig,
-        150.0,
-        contact=Contact(normal=normal),
-        integrator=Integrator(method=method, step=step),
-        samples_per_revolution=256,
-    )
-    rest = at_rest(setup, gap)
-    stiffness = 3e9 * 25e-6 / 0.04
-    assert rest.contact_force == pytest.approx([(sag - gap) / (1 / 143343.35 + 1 / stiffness)], rel=1e-4)
-    recording = Recording(transient=0, revolutions=1)
-    record = run_case(setup, clearance=gap, friction=0.0, recording=recording)
-    assert record.contact_fraction == pytest.approx([1.0])
-    stands = -gap - rest.contact_force[0] / stiffness
-    # The force of short steps comes in impulses, the first of which is half a step early.
-    still = 2e-5 if (method, normal) == ("modal", "updated") else 1e-9
-    assert record.vertical == pytest.approx(np.full(256, stands), rel=still)
-    assert record.contact_force[0, 1:] == pytest.approx(np.full(255, rest.contact_force[0]), rel=1e-4)
 
 
 def crossed(rig, table=False):
@@ -234,13 +187,6 @@ def test_rest_with_circulation_solves_the_static_equations():
     assert rest.contact_force == pytest.approx(known[-1:], rel=1e-6)
     at = [rotor.index(8, name) for name in ("v", "w")]
     assert rest.rotor_displacement[at] == pytest.approx(known[at], rel=1e-6)
-
-
-@pytest.mark.parametrize("law", [{}, {"law": "penalty", "stiffness": 5e6}])
-def test_a_touch_of_an_impulse_leaves_the_shaft_at_rest(law):
-    case = {"speed": FAST, "clearance": "150 um", "friction": 0.0, "transient": 0, "revolutions": 1}
-    record = simulate(ON_STATOR, **case, **law, initial={"impulse": 1e-9})
-    assert np.ptp(record.vertical) < 1e-11
 
 
 def test_a_stator_that_is_free_to_move_gives_no_rest():

@@ -180,26 +180,6 @@ def test_bar_bounces_under_gravity():
     assert again[0] == pytest.approx(11 / 3, rel=0.01)
 
 
-def test_packaged_rotor_by_its_matrices_rubs_alike():
-    """The same rig, once assembled and once handed over as matrices, in either integrator."""
-    packaged = read_rig("mokhtar2017")
-    rotor = assemble(packaged).rotor
-    given = Rig.from_matrices(
-        rotor.mass,
-        rotor.damping,
-        rotor.stiffness,
-        rotor.gyroscopic,
-        degrees=rotor.degrees,
-        stators=[replace(packaged.stator[0], radius=0.06)],
-        unbalance=packaged.rotor.unbalance,
-    )
-    rub = {"speed": 150.0, "clearance": "60 um", "transient": 1, "revolutions": 2}
-    for method in ("modal", "central-difference"):
-        one, other = (simulate(rig, method=method, **rub) for rig in (given, packaged))
-        for name in ("vertical", "torsion", "contact_force", "stator_lateral"):
-            assert np.array_equal(getattr(one, name), getattr(other, name)), name
-
-
 class RossRotor:
     """What ROSS 2.3.0 gives for the packaged rotor without damping, as `tests/data` keeps it.
 
@@ -246,26 +226,6 @@ def test_rotor_of_ross_rubs_as_the_packaged_one(request, spin):
     for name in ("vertical", "horizontal", "torsion", "contact_force"):
         found, known = getattr(one, name), getattr(other, name)
         assert found == pytest.approx(known, abs=1e-8 * abs(known).max()), name
-
-
-def test_unbalance_of_an_oscillator_drives_it():
-    """x'' + 2 z x' + x = F cos(w t): F is what the unbalance m e w^2 makes of it."""
-    w, z = 2.2, 0.05
-    rig = Rig.from_matrices(
-        [[1.0]],
-        [[2 * z]],
-        [[1.0]],
-        degrees=[(1, "v")],
-        stators=[below(rigid=True)],
-        unbalance=[Unbalance(node=1, mass=1.0, radius=1.0 / w**2)],
-    )
-    for method in ("modal", "central-difference"):
-        record = simulate(rig, speed=w, clearance=5.0, transient=200, revolutions=2, method=method, step=2e-3)
-        known = 1.0 / math.hypot(1 - w**2, 2 * z * w)
-        assert record.vertical.max() == pytest.approx(known, rel=1e-4)
-        assert record.settings["contact_free_amplitude"] == pytest.approx(known, rel=1e-12)
-        assert not record.horizontal.any()
-    assert rubhpc.assemble(rig).rotor.n_dof == 1
 
 
 RESTS = [(1.6, None, 1.896764), (0.4, 0.5, 6.497982)]
