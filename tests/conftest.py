@@ -56,6 +56,7 @@ SLOW = (
     "integrate/changing_speed/test_carried_modes.py",
     "integrate/changing_speed/test_driven.py",
     "integrate/changing_speed/test_unfollowed_modes.py",
+    "integrate/marches/test_event_driven_march.py::test_dry_whip_diverges_and_says_so",
     "integrate/marches/test_event_driven_march.py::test_endless_events_are_left_to_short_steps",
     "integrate/marches/test_event_driven_march.py::test_shorter_kernel_calls_change_nothing_but_rounding",
     "integrate/reduced_model/test_friction_mode.py::test_tables_hold_rates",

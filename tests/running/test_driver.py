@@ -15,7 +15,7 @@ import xarray as xr
 from running import array_of, journalled_cases, write_sample, write_study
 from stub_physics import Physics, record
 
-from rubhpc.errors import InputError, RubError, StoppedEarly
+from rubhpc.errors import InputError, RubError, StoppedEarly, StoreError
 from rubhpc.kernels._jit import compilation
 from rubhpc.running import case_setup, computing, job, stopping, worker
 from rubhpc.running.driver import run
@@ -27,6 +27,7 @@ from rubhpc.schema import (
     FAILED,
     MISSING,
 )
+from rubhpc.storage.disk import disk_errors
 from rubhpc.storage.status import read_status
 from rubhpc.storage.store import Store
 from rubhpc.storage.verify import verify
@@ -274,6 +275,27 @@ def test_the_end_of_the_slurm_job_stops_a_run(physics, study, monkeypatch):
         run(study, quiet=True)
     monkeypatch.setenv("SLURM_JOB_END_TIME", str(int(time.time()) + 3600))
     assert run(study, quiet=True).counts == (0, 12, 0, 0, 0)
+
+
+def test_a_disk_that_fills_up_keeps_what_is_there(physics, study, monkeypatch):
+    write_block = Store.write_block
+    n_block = 0
+
+    def fill_up(self: Store, *arguments: Any) -> None:
+        nonlocal n_block
+        n_block += 1
+        if n_block == 3:
+            with disk_errors(self.path):
+                raise OSError(28, "No space left on device")
+        write_block(self, *arguments)
+
+    monkeypatch.setattr(Store, "write_block", fill_up)
+    with pytest.raises(StoreError, match="the disk is full"):
+        run(study, quiet=True)
+    n_before = journalled_cases(study.output)
+    assert n_before > 0
+    assert run(study, quiet=True).computed == 12 - n_before
+    assert not verify(study.output)
 
 
 def test_the_store_is_free_again_after_any_end(physics, study):

@@ -1,6 +1,7 @@
 """Whole cases by the exact modal integrator: what must hold to rounding, and what happens at its edges."""
 
 import math
+import re
 import time
 from dataclasses import replace
 from functools import partial
@@ -17,6 +18,7 @@ from rubhpc.fem.response import steady_response
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.marches import event_driven as event_driven_march
 from rubhpc.integrate.marches import march, met_modes
+from rubhpc.integrate.marches.march import NO_FORCES
 from rubhpc.integrate.measuring.divergence import energy_limit
 from rubhpc.integrate.reduced_model import mode_library
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
@@ -30,7 +32,7 @@ from rubhpc.rig.reading import with_keys
 from rubhpc.rig.rig import Rig
 from rubhpc.rig.rotors import Rotor
 from rubhpc.rig.stators import LumpedStator
-from rubhpc.schema import DONE, SCHEMES
+from rubhpc.schema import DIVERGED, DONE, SCHEMES
 from rubhpc.study.study import Contact, Integrator, Recording
 
 SPEED = 170.0
@@ -224,6 +226,28 @@ def test_unusual_cases_agree_with_the_central_difference(rig, speed, clearance, 
     for name in ("contact_impulse", "contact_duration", "friction_work"):
         assert getattr(found, name) == pytest.approx(getattr(known, name), rel=1e-3), name
     assert found.minimum_slip_speed == pytest.approx(known.minimum_slip_speed, rel=0.01, nan_ok=True)
+
+
+@pytest.mark.parametrize("normal", ["fixed", "updated"])
+def test_dry_whip_diverges_and_says_so(normal):
+    rig = read_rig("mokhtar2017")
+    around = tuple(replace(rig.stator[0], angle=2 * math.pi * i / 3, lateral=False) for i in range(3))
+    record = simulate(
+        replace(rig, stator=around),
+        speed=148.7,
+        clearance="20 um",
+        friction=0.8,
+        normal=normal,
+        transient=1,
+        revolutions=40,
+    )
+    assert record.status == DIVERGED
+    passed = r"the displacement of the rotor at node 8 passed 0.08 m|the mechanical energy passed 716 J, .*"
+    assert re.fullmatch(rf"({passed}|{NO_FORCES}) in revolution \d+", record.reason)
+    assert np.isnan(record.vertical[-1])
+    assert np.isnan(record.peak_contact_force).all()
+    assert record.period == -1
+    assert record.steps > 0
 
 
 METHODS = ({"method": "modal"}, {"method": "central-difference", "step": "2 us"})
