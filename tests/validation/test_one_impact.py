@@ -166,3 +166,28 @@ def test_fold_and_grazing_over_the_wall_are_where_the_closed_form_has_them(dampi
     assert [name for name, _ in found[:2]] == ["FOLD", "GRAZING"]
     assert found[0][1] == pytest.approx(fold, rel=1e-9)
     assert found[1][1] == pytest.approx(free, rel=1e-8)
+
+
+def test_two_motions_meet_at_the_fold_and_graze_at_a_corner():
+    """Without damping, in longer steps: the contact-free motion follows behind the corner."""
+    w, e = 1.7, 0.7
+    family = Oscillators("clearance", 2.0, 0.0, None, e, w)
+    branching = Branching(family, 0.1)
+    first = family.first(branching, 0.0, motions(w, 0.0, 0.0, e, 1)[0], 1)
+    track = follow(branching, [first], 1.0, low=-0.1, high=2.0, most=100)
+    events = [(event.name, point) for event, point in zip(track.events, track.points, strict=True) if event]
+    assert [name for name, _ in events] == ["FOLD", "GRAZING", "END"]
+    k, h = (1 + e) / (2 * math.tan(math.pi / w)), (1 - e) / (2 * w)
+    assert events[0][1].value == pytest.approx(math.hypot(1, k / h) / (w**2 - 1), rel=1e-9)
+    assert events[1][1].value == pytest.approx(1 / (w**2 - 1), rel=1e-8)
+    assert track.end == "the range ends"
+    for found in track.points:
+        speeds = [speed for r in found.revolutions for piece in r.pieces for speed in piece.approach]
+        if len(speeds) == 1:
+            assert (found.value + k * speeds[0]) ** 2 + (h * speeds[0]) ** 2 == pytest.approx(
+                (1 - w**2) ** -2
+            )
+            # Entries of the matrix are right to some roundings, which grow as 1 / speed.
+            a, b, c, d = found.monodromy.ravel()
+            rounding = 16 * np.finfo(float).eps * (abs(a * d) + abs(b * c))
+            assert a * d - b * c == pytest.approx(e**2, abs=rounding, rel=0.0)
