@@ -6,12 +6,14 @@ Tests in a browser are collected where there is one, those of ROSS where it is i
 have a cache of kernels each.
 """
 
+import gc
 import os
 import sys
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
+import psutil
 import pytest
 from browsers import find_browser
 from hypothesis import settings
@@ -272,9 +274,23 @@ def no_figures_left() -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def nothing_recent() -> None:
-    """Forget what calls of tests before have made: a test may change what goes into it."""
+    """Forget what calls of tests before have made: a test may change what goes into it.
+
+    Parts of a run-up refer to one another: they are looked for once the process has grown by 0.1 GB.
+    """
     if recent := sys.modules.get("rubhpc.recent"):
         recent.forget()
+        if resident() > HELD[-1] + 1e8:
+            gc.collect()
+            HELD[:] = [resident()]
+
+
+HELD = [0]  # bytes of this process after the last search
+
+
+def resident() -> int:
+    """Bytes of memory that this process holds."""
+    return int(psutil.Process().memory_info().rss)
 
 
 @pytest.fixture(scope="session")
