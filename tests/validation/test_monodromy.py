@@ -24,6 +24,13 @@ ALL_MODES = Integrator(accuracy=1e-12)
 OVERHUNG = {"rotor.bearing.2.node": 2, "rotor.gravity": "9.81 m/s^2"}  # the disc beyond both bearings, below
 
 
+def kept_closed(piecewise, direction):
+    """What is left of a change (2 n,) of the beginning in its contact mode: closed gaps stay closed."""
+    tables = piecewise.mode(piecewise.states).tables
+    re, im = direction @ tables.enter_re, direction @ tables.enter_im
+    return tables.shape_re @ re - tables.shape_im @ im
+
+
 def ring_of(count):
     """The packaged rotor in a ring of springs."""
     springs = LumpedStator(node=8, radius=0.06, count=count, mass=1e-3, damping=2.0, stiffness=1e5)
@@ -77,8 +84,7 @@ def test_periodic_motion_and_its_monodromy_are_those_of_all_degrees_of_freedom(
     for _ in range(2):
         direction = random.standard_normal(2 * n) * scale
         if closed:  # neighbours that keep the closed gaps closed
-            mode = piecewise.mode(piecewise.states)
-            direction = mode.propagator(0.0) @ direction
+            direction = kept_closed(piecewise, direction)
         step = 1e-6 * size / piecewise.size(direction) * direction
         ahead, _ = follow(start + step)
         behind, _ = follow(start - step)
@@ -136,7 +142,7 @@ def test_monodromy_under_coulombs_law_is_that_of_all_degrees_of_freedom(
     for _ in range(2):
         direction = random.standard_normal(2 * n) * scale
         if is_closed.any():
-            direction = piecewise.mode(piecewise.states).propagator(0.0) @ direction
+            direction = kept_closed(piecewise, direction)
         step = 1e-6 * size / piecewise.size(direction) * direction
         (ahead, passed_ahead), (behind, passed_behind) = follow(start + step), follow(start - step)
         assert passed_ahead == passed_behind == passed
