@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.errors import InputError
-from rubhpc.integrate.branches.point import SAME_MOTION, HeldCase, Point, away_from_events
+from rubhpc.integrate.branches.point import SAME_MOTION, Point, away_from_events
 from rubhpc.integrate.periodic_motions.piecewise_motion import Unfollowed
 from rubhpc.integrate.periodic_motions.saltation import monodromy
 from rubhpc.integrate.periodic_motions.shooting import NotConverged, shoot
@@ -75,7 +75,7 @@ class Branching:
             motion=orbit.motion,
             states=orbit.states,
             revolutions=list(orbit.revolutions),
-            held=HeldCase(self.family, value, case),
+            family=self.family,
         )
         return self.moved(point, away_from_events(point))
 
@@ -90,7 +90,7 @@ class Branching:
             motion=motion,
             states=states,
             revolutions=point.case.follow(motion, states, point.period, phase=phase),
-            held=point.held,
+            family=point.family,
         )
 
     def repeated(self, point: Point, times: int) -> Point:
@@ -224,7 +224,7 @@ class Branching:
                     self._n_found += 1
                     return Point(
                         value=value, phase=phase, motion=motion, states=states, revolutions=revolutions,
-                        held=HeldCase(family, value, case),
+                        family=family,
                     )  # fmt: skip
                 states = revolutions[-1].states
                 is_late = iteration >= most and residual > SOON

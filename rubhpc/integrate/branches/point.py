@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
-from weakref import ref
 
 import numpy as np
 
@@ -32,26 +31,6 @@ REAL = 1e-6  # imaginary part below which a multiplier counts as real
 CENTRAL = 0.2  # share of an event-free piece at either end without a section
 
 
-class HeldCase:
-    """The case of a point, as long as the family has room: its tables are much larger than a point.
-
-    Later it is set up again.
-    """
-
-    def __init__(self, family: Family, value: float, case: PiecewiseMotion) -> None:
-        self._family, self._value, self._case = family, value, ref(case)
-        family.hold(case)
-
-    def __call__(self) -> PiecewiseMotion:
-        """The case."""
-        case = self._case()
-        if case is None:
-            case = self._family.at(self._value)
-            self._case = ref(case)
-            self._family.hold(case)
-        return case
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Point:
     """A periodic motion on a branch.
@@ -64,8 +43,8 @@ class Point:
         Angle of the shaft, in revolutions, at which `motion` (2 n,) is taken, and `states` of the pairs.
     revolutions : list of Revolution
         As many as its period.
-    held : HeldCase
-        The case whose coordinates these are.
+    family : Family
+        Its case at the value is the one whose coordinates these are.
     """
 
     value: float
@@ -73,12 +52,12 @@ class Point:
     motion: Floats
     states: int
     revolutions: list[Revolution]
-    held: HeldCase
+    family: Family
 
     @property
     def case(self) -> PiecewiseMotion:
-        """The case whose motion this is, with its tables."""
-        return self.held()
+        """The case whose motion this is, set up again where the family had no room for it."""
+        return self.family.at(self.value)
 
     @property
     def period(self) -> int:

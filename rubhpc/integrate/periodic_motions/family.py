@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 SPEEDS, CLEARANCES = ("speed_ratio", "speed"), ("clearance_ratio", "clearance")
-MOST_KEPT = 6  # cases that are kept
+MOST_KEPT = 6  # models and set-ups that are kept, and cases in any case
 ROOM = 256_000_000  # bytes of the tables of further ones
 WITH_MODES = 2.2  # bytes of tables and modes, as solved and for pieces, over those of tables
 DIFFERENCE = 1e-6  # of the range, between the two cases of a derivative
@@ -100,7 +100,6 @@ class Family:
         self._frequency: tuple[Model, float] | None = None
         self._setups: OrderedDict[tuple[int, float, bool], ModalSetup] = OrderedDict()
         self._cases: OrderedDict[float, PiecewiseMotion] = OrderedDict()
-        self._held: OrderedDict[int, PiecewiseMotion] = OrderedDict()  # by id
 
     def at(self, value: float) -> PiecewiseMotion:
         """The case at a value of the parameter.
@@ -119,18 +118,9 @@ class Family:
             except NoClosedForm:
                 raise Unfollowed("contacts open and close without end, or in too many combinations") from None
             self._cases[value] = found
-            if len(self._cases) > MOST_KEPT:
-                self._forget(self._cases.popitem(last=False)[1])
+            self._make_room()
         self._cases.move_to_end(value)
         return self._cases[value]
-
-    def hold(self, case: PiecewiseMotion) -> None:
-        """Keep a case while there is room, the latest ones first."""
-        self._held[id(case)] = case
-        self._held.move_to_end(id(case))
-        room = ROOM - sum(map(_size, self._held.values()))  # they grow while they are used
-        while room < 0 and len(self._held) > 1:
-            room += _size(self._held.popitem(last=False)[1])
 
     def settings(self, value: float, *, is_measured: bool = True) -> tuple[ModalSetup, float, float]:
         """Set-up, clearance (m) and friction at a value; to record, or only to follow."""
@@ -184,10 +174,14 @@ class Family:
         defect = self.carry(followed[-1].end, there, here) - self.carry(begun, there, here)
         return (defect - (revolutions[-1].end - motion)) / step, followed
 
-    def _forget(self, case: PiecewiseMotion) -> None:
-        """Free the contact modes of one friction in a shared set-up."""
-        if self.along == "friction":
-            case.setup.forget(float(case.bodies.friction[0]))
+    def _make_room(self) -> None:
+        """Give up the cases that have not been used for longest, unless there are few, or room for them."""
+        room = ROOM - sum(map(_size, self._cases.values()))  # they grow while they are used
+        while room < 0 and len(self._cases) > MOST_KEPT:
+            case = self._cases.popitem(last=False)[1]
+            room += _size(case)
+            if self.along == "friction":  # contact modes of one friction in a shared set-up
+                case.setup.forget(float(case.bodies.friction[0]))
 
     def _spin(self, case: Operation, model: Model) -> float:
         """Speed of a case, rad/s."""
