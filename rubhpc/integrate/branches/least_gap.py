@@ -46,7 +46,7 @@ class LeastGap:
     def gradient(self) -> Floats:
         """Derivative (2 n,) of the gap with respect to the motion at the section."""
         case = self.point.case
-        tables, j = case.mode(_pieces(self.point)[self._place].states).tables, _switch(case, self.pair)
+        tables, j = case.mode(self.point.pieces[self._place].states).tables, _switch(case, self.pair)
         row = tables.switch_re[j] + 1j * tables.switch_im[j]
         row = row * np.exp((tables.exponent[0] + 1j * tables.exponent[1]) * self._time)
         gradient: Floats = tables.enter_re @ row.real - tables.enter_im @ row.imag
@@ -59,7 +59,7 @@ class LeastGap:
         gap, and the pair parts at once. Closed pairs stay closed.
         """
         case, bodies = self.point.case, self.point.case.bodies
-        closed = case.mode(_pieces(self.point)[self._place].states).is_closed.copy()
+        closed = case.mode(self.point.pieces[self._place].states).is_closed.copy()
         closed[self.pair] = True
         hit = np.flatnonzero(closed)
         speed = np.where(hit == self.pair, np.sqrt(2.0 * max(depth * self.bend, 0.0)), 0.0)
@@ -76,7 +76,7 @@ class LeastGap:
 def least_gap(point: Point, pair: int) -> LeastGap | None:
     """Find the least gap of a pair; None where the gap has no minimum in a piece of the period."""
     case, best = point.case, (np.inf, 0, 0.0)
-    pieces = _pieces(point)
+    pieces = point.pieces
     begins = [point.motion, *(piece.after for piece in pieces)]
     for place, (piece, begun) in enumerate(zip(pieces, begins, strict=False)):
         if not case.mode(piece.states).is_open[pair]:
@@ -104,10 +104,6 @@ def least_gap(point: Point, pair: int) -> LeastGap | None:
     return LeastGap(
         point=point, pair=pair, gap=float(gap[0]), bend=float(bend[0]), _place=place, _time=time
     )  # fmt: skip
-
-
-def _pieces(point: Point) -> list[Piece]:
-    return [piece for revolution in point.revolutions for piece in revolution.pieces]
 
 
 def _switch(case: PiecewiseMotion, pair: int) -> int:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from rubhpc.integrate.periodic_motions.family import Family
     from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
-    from rubhpc.integrate.periodic_motions.revolution import Revolution
+    from rubhpc.integrate.periodic_motions.revolution import Piece, Revolution
     from rubhpc.integrate.record import State
 
     Floats = NDArray[np.float64]
@@ -63,6 +63,16 @@ class Point:
     def period(self) -> int:
         """Revolutions."""
         return len(self.revolutions)
+
+    @property
+    def pieces(self) -> list[Piece]:
+        """Its linear pieces, of all revolutions."""
+        return [piece for revolution in self.revolutions for piece in revolution.pieces]
+
+    @property
+    def parameter_axis(self) -> Floats:
+        """A change by one step of the parameter alone, (2 n + 1,)."""
+        return np.append(np.zeros(self.motion.size), 1.0)
 
     def tangents(self) -> list[Floats]:
         """Derivatives (2 n, 2 n), by the motion, of the motion after each piece and its event."""
@@ -131,12 +141,7 @@ class Point:
 
         It begins with the smallest, so that it does not depend on the section.
         """
-        events = [
-            (piece.states, tuple(piece.touching.tolist()))
-            for revolution in self.revolutions
-            for piece in revolution.pieces
-            if piece.crossing
-        ]
+        events = [(piece.states, tuple(piece.touching.tolist())) for piece in self.pieces if piece.crossing]
         if not events:
             return ((self.states, ()),)
         return min(tuple(events[k:] + events[:k]) for k in range(len(events)))
@@ -147,7 +152,7 @@ def away_from_events(point: Point) -> float:
 
     An impact at the section would make the motion there jump.
     """
-    turn, pieces = point.case.turn, [piece for r in point.revolutions for piece in r.pieces]
+    turn, pieces = point.case.turn, point.pieces
     times = np.cumsum([piece.duration for piece in pieces]) / turn
     events = np.array([time for time, piece in zip(times, pieces, strict=True) if piece.crossing])
     if not events.size:

@@ -10,6 +10,7 @@ import numpy as np
 
 from rubhpc.integrate.branches.least_gap import least_gap
 from rubhpc.integrate.periodic_motions.piecewise_motion import Unfollowed
+from rubhpc.integrate.periodic_motions.revolution import least_of
 from rubhpc.integrate.periodic_motions.shooting import NotConverged
 
 if TYPE_CHECKING:
@@ -63,7 +64,8 @@ def weakly_impacting(branching: Branching, free: Sequence[Point], share: float =
         ended, ahead = branching.rate(base, small)
     except Unfollowed as problem:
         raise NotConverged(str(problem)) from None
-    rate = (min(float(one.least_gap[pair]) for one in ahead) - float(_least_gaps(base)[pair])) / small
+    was, now = (float(least_of(some)[0][pair]) for some in (base.revolutions, ahead))
+    rate = (now - was) / small
     row = np.append(least.gradient / base.scale, rate)
     if not np.isfinite(row).all() or rate == 0.0:
         raise NotConverged("the least gap has no derivative")
@@ -87,7 +89,7 @@ def _beside(branching: Branching, free: Sequence[Point]) -> tuple[Point, int, fl
     def nearly(points: Iterable[Point]) -> tuple[Point, int, float, float] | None:
         found = []
         for point in points:
-            gap = _least_gaps(point)
+            gap, _ = least_of(point.revolutions)
             clearance = np.abs(point.case.bodies.clearance[: gap.size])
             pair = int(np.argmin(gap / clearance))
             if NEAR[0] * clearance[pair] < gap[pair] < NEAR[1] * clearance[pair]:
@@ -102,8 +104,3 @@ def _beside(branching: Branching, free: Sequence[Point]) -> tuple[Point, int, fl
         if (found := nearly([moved])) is not None:
             return found
     raise NotConverged("no gap is about to close")
-
-
-def _least_gaps(point: Point) -> Floats:
-    """Least gaps (q,), m, over a period."""
-    return np.asarray(np.min([revolution.least_gap for revolution in point.revolutions], axis=0))

@@ -5,13 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels.flow import BEFORE
 from rubhpc.kernels.revolutions import AFTER, PieceRows, piece_rows
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 Floats = NDArray[np.float64]
 
@@ -101,6 +104,12 @@ def _piece(stride: int, states: list[int], times: list[float], motions: Floats, 
         after=motions[AFTER],
         states_after=after,
     )
+
+
+def least_of(revolutions: Iterable[Revolution]) -> tuple[Floats, Floats]:
+    """Smallest gap and force (q,), m and N, of each pair where it turns between events; inf: none."""
+    gaps, forces = zip(*((one.least_gap, one.least_force) for one in revolutions), strict=True)
+    return np.min(gaps, axis=0), np.min(forces, axis=0)
 
 
 def whole_revolutions(rows: PieceRows, least: Floats) -> list[Revolution]:
