@@ -99,13 +99,12 @@ def simulate(
     accuracy : float
         Relative error of each signal and force, of the modal integrator: by the modes that it leaves out, and
         by its steps where gaps are curved.
-    transient : int, "auto", "direct" or "shared"
+    transient : int, "auto" or "direct"
         Revolutions discarded; "auto" until displacements repeat themselves after 8 or 12 revolutions;
         "direct" until the motion draws near to a stable periodic one that is solved for, on which the record
-        begins; "shared" the same, looking first among the motions that a fixed set of starts reaches: for
-        studies of many starts at one setting.
+        begins.
     transient_limit : int, optional
-        Most revolutions discarded with `transient="auto"`, `"direct"` or `"shared"`; default 240.
+        Most revolutions discarded with `transient="auto"` or `"direct"`; default 240.
     transient_tolerance : float, optional
         Largest difference of displacements that count as settled with `transient="auto"`, relative to their
         largest value; default 1e-4.

@@ -152,6 +152,8 @@ def _check_root(attributes: dict[str, Any]) -> None:
 def _check_table(table: dict[str, Any], known: dict[str, Any], where: str) -> None:
     """Refuse values that their keys cannot have, and of unknown keys all but numbers and texts."""
     for key, value in table.items():
+        if isinstance(value, str) and key in known and value in known[key].metadata.get("gone", ()):
+            continue  # stores keep what was written when they were made
         if key in known and value is not None and known[key].metadata.get("kind"):
             parse_field(known[key], value, f"{where} {key}")
         elif isinstance(value, dict) or (isinstance(value, list) and any(isinstance(v, dict) for v in value)):

@@ -5,11 +5,15 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import MISSING, field
 from numbers import Integral
-from typing import Any
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
 from rubhpc.errors import InputError
 from rubhpc.input.kinds import KINDS
 from rubhpc.input.messages import place
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 
 class FieldError(InputError):
@@ -69,9 +73,13 @@ def count(
     at_most: int | None = None,
     is_key: bool = True,
     or_words: tuple[str, ...] = (),
+    gone: Mapping[str, str] = MappingProxyType({}),
 ) -> Any:
-    """Declare a field that holds a bounded whole number, or one of some words; a study may set a key."""
-    bounds = {"at_least": at_least, "at_most": at_most, "or_words": or_words}
+    """Declare a field that holds a bounded whole number, or one of some words; a study may set a key.
+
+    `gone` are words of older versions, with what a message says of each.
+    """
+    bounds = {"at_least": at_least, "at_most": at_most, "or_words": or_words, "gone": gone}
     return _declare("count", doc, example, default, is_key=is_key, **bounds)
 
 

@@ -75,6 +75,8 @@ def _check_series(values: Any, limits: Limits) -> str:
 def _parse_count(value: object, limits: Limits, where: str) -> int | str:
     if isinstance(value, str) and value in limits["or_words"]:
         return value
+    if isinstance(value, str) and value in limits["gone"]:
+        raise InputError(f"{where}: {limits['gone'][value]}")
     if isinstance(value, float) and value.is_integer():
         return int(value)  # an axis holds floats
     if isinstance(value, bool) or not isinstance(value, Integral):
@@ -88,6 +90,8 @@ def _parse_count(value: object, limits: Limits, where: str) -> int | str:
 def _check_count(value: object, limits: Limits) -> str:
     if isinstance(value, str) and value in limits["or_words"]:
         return ""
+    if isinstance(value, str) and value in limits["gone"]:
+        return str(limits["gone"][value])
     if type(value) is not int and (isinstance(value, bool) or not isinstance(value, Integral)):
         words = "".join(f', or "{word}"' for word in limits["or_words"])
         return f"{brief(value)} is not a whole number; give one such as 12{words}"

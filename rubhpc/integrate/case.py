@@ -44,9 +44,9 @@ from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.periodic_motions.direct import pass_directly
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.periodic_motions.proof import Solver
-from rubhpc.integrate.periodic_motions.shared_motions import shared_motions
+from rubhpc.integrate.periodic_motions.solved_motion import SolvedMotion, solved_motions
 from rubhpc.integrate.record import Record, State
-from rubhpc.integrate.repeated_record import KnownMotion, repeat_period
+from rubhpc.integrate.repeated_record import repeat_period
 from rubhpc.integrate.scheme import Scheme
 from rubhpc.integrate.start import start_of
 from rubhpc.integrate.transient import pass_revolutions, pass_transient
@@ -63,7 +63,6 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.model import Model
     from rubhpc.integrate.marches.march import March
-    from rubhpc.integrate.periodic_motions.walk import Passed
     from rubhpc.integrate.setup import Setup
     from rubhpc.kernels.accumulators import Samples
     from rubhpc.kernels.trail import Trail
@@ -202,24 +201,25 @@ def _integrate(
     clearance: float,
     friction: float,
     recording: Recording,
-    motion: KnownMotion | None = None,
 ) -> Record:
-    """March through transient and record, then measure; a `motion` is one on which the case begins."""
+    """March through transient and record, then measure."""
     march = start(initial)
+    motion: SolvedMotion | None = None  # that the transient ends on
     n_step = n_left = 0
     per_revolution = setup.samples_per_revolution
     settings = {"spin_speed": setup.spin, "clearance": clearance}
     begin = partial(_solve_from, setup, clearance, friction)
     if recording.is_transient_direct and isinstance(march, EventDrivenMarch) and march.has_closed_form:
-        passed, record = _pass_directly(march, start, begin, initial, setup, clearance, friction, recording)
-        if record is not None:
-            return record
-        march, reason, n_transient, n_step = passed.march, passed.reason, passed.n_revolution, passed.n_step
-        motion = None if passed.found is None else KnownMotion.of(passed.found)
+        motions = solved_motions(march.setup, (clearance, friction, recording))
+        march, reason, n_transient, n_step, motion = pass_directly(march, begin, recording, motions)
+        if motion is not None and motion.record is not None:
+            record, n_own_step, n_own_left = motion.record
+            return _counted(record.copied(), n_transient, n_step + n_own_step, march.n_left + n_own_left)
     else:
         reason, n_transient = pass_transient(march, recording)
     marched: Marched | None = None
     trail: Trail | None = None
+    n_step_before, n_left_before = n_step, march.n_left
     if reason is not None:  # the record shows the way to divergence
         n_step, n_left = n_step + march.n_step, march.n_left
         ended = n_transient + march.sample // per_revolution + 1
@@ -286,45 +286,15 @@ def _integrate(
         if "waveform" not in recording.keep:
             record.signals.clear()
         give_back(march, trail)
+    if motion is not None:
+        motion.record = record.copied(), n_step - n_step_before, n_left - n_left_before
+    return _counted(record, n_transient, n_step, n_left)
+
+
+def _counted(record: Record, n_transient: int, n_step: int, n_left: int) -> Record:
+    """Note what it took to come to a record and through it."""
     record.measures.update(transient_revolutions=n_transient, steps=n_step, left_closed_form=n_left)
     return record
-
-
-def _pass_directly(
-    march: EventDrivenMarch,
-    start: Callable[[State], March],
-    begin: Callable[[State | None, EventDrivenMarch], PiecewiseMotion],
-    initial: State,
-    setup: Setup,
-    clearance: float,
-    friction: float,
-    recording: Recording,
-) -> tuple[Passed, Record | None]:
-    """Pass the transient by the direct method; returns the record of a known motion if it reaches one."""
-    known = None
-    if recording.is_transient_shared:
-        assert isinstance(setup, ModalSetup)
-        known, is_new = shared_motions(setup, clearance, friction, recording, start, begin)
-        if is_new:  # the tables may have been filled again
-            again = start(initial)
-            assert isinstance(again, EventDrivenMarch)
-            march = again
-    passed = pass_directly(march, begin, recording, known)
-    if known is None or passed.reached is None:
-        return passed, None
-    at_once = replace(recording, transient=0, transient_limit=None, transient_tolerance=None)
-
-    place = known.place(passed.reached)
-
-    def begun_at(state: State) -> Record:
-        motion = KnownMotion(place.period, place.multiplier)
-        record = _integrate(start, state, setup, clearance, friction, at_once, motion)
-        return replace(record, final=with_overlap(record.final, setup, clearance))
-
-    record = known.record(passed.reached, begun_at).copied()
-    record.measures["transient_revolutions"] = passed.n_revolution
-    record.measures["steps"] = passed.n_step + passed.march.n_step
-    return passed, record
 
 
 def _solve_from(

@@ -17,6 +17,7 @@ from rubhpc.integrate.marches.closed_form import closed_form_march
 from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.periodic_motions.piecewise_motion import Change, PiecewiseMotion
+from rubhpc.integrate.periodic_motions.revolution import least_of
 from rubhpc.integrate.periodic_motions.shooting import NotConverged, Orbit, shoot
 from rubhpc.integrate.record import Record, State
 from rubhpc.integrate.scheme import Scheme
@@ -151,7 +152,7 @@ def find_periodic_motion(
     except NoClosedForm:
         problem = "contacts open and close without end, or in too many combinations"
         raise NoPeriodicMotion(f"periodic: {problem}; use another case") from None
-    multipliers = orbit.multipliers
+    multipliers, (least_gap, least_force) = orbit.multipliers, least_of(orbit.revolutions)
     state = piecewise.march.state_of(orbit.motion, piecewise.contact_force(orbit.states, orbit.motion))
     return PeriodicMotion(
         period=orbit.period,
@@ -164,8 +165,8 @@ def find_periodic_motion(
         monodromy=orbit.monodromy,
         residual=orbit.residual,
         iterations=orbit.iterations,
-        least_gap=np.min([revolution.least_gap for revolution in orbit.revolutions], axis=0),
-        least_force=np.min([revolution.least_force for revolution in orbit.revolutions], axis=0),
+        least_gap=least_gap,
+        least_force=least_force,
         events=tuple(_events(piecewise, orbit)),
     )
 

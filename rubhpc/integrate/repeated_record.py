@@ -3,45 +3,24 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rubhpc.integrate.marched_record import Marched, march_record
-from rubhpc.integrate.measuring.regimes import known_regime
 from rubhpc.integrate.measuring.repetition import Part, repeated_samples, repeated_sums
 from rubhpc.integrate.measuring.samples import empty_samples, following_accumulator
-from rubhpc.integrate.periodic_motions.known_motions import nothing
+from rubhpc.integrate.periodic_motions.approach import nothing
 from rubhpc.kernels.force_average import AVERAGING_TIME, COUNT, END, OLDEST
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.integrate.marches.event_driven import EventDrivenMarch
-    from rubhpc.integrate.measuring.regimes import Verdict
     from rubhpc.integrate.modal_setup import ModalSetup
-    from rubhpc.integrate.periodic_motions.known_motions import Found
     from rubhpc.kernels.accumulators import Accumulator
 
     Floats = NDArray[np.float64]
-
-
-class KnownMotion(NamedTuple):
-    """A stable periodic motion that was solved for."""
-
-    period: int  # revolutions
-    multiplier: complex  # the largest
-
-    @classmethod
-    def of(cls, found: Found) -> KnownMotion:
-        """That of a solution."""
-        return cls(found.orbit.period, found.approach.multiplier)
-
-    def judge(
-        self, _vertical: Floats, _horizontal: Floats, _per_revolution: int, is_contact: bool
-    ) -> Verdict:
-        """Judge its record, whatever the orbit."""
-        return known_regime(self.period, self.multiplier, is_contact=is_contact)
 
 
 def repeat_period(march: EventDrivenMarch, period: int, n_revolution: int) -> tuple[Marched | None, int]:

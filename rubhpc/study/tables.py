@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rubhpc.study.contact_keys import Contact
 
 # Transient until the motion has settled, is solved for, or is one of those solved for all starts.
-AUTO, DIRECT, SHARED = "auto", "direct", "shared"
+AUTO, DIRECT = "auto", "direct"
 LONGEST_TRANSIENT, SETTLED_WITHIN = 240, 1e-4  # then
 PAPER_STEP = 0.5e-6  # s
 SAFE_SHARE = 0.9  # of the stability limit
@@ -95,15 +95,16 @@ class Recording:
 
     transient: int | str = count(
         doc='Revolutions discarded; "auto" until the motion has settled, "direct" until it approaches a '
-        'periodic motion that is solved for, "shared" the same with motions solved once for all starts.',
+        "periodic motion that is solved for.",
         example='"auto"',
         default=120,
         at_least=0,
         at_most=1_000_000,
-        or_words=(AUTO, DIRECT, SHARED),
+        or_words=(AUTO, DIRECT),
+        gone={"shared": f'"shared" is gone: write transient = "{DIRECT}"'},
     )
     transient_limit: int | None = count(
-        doc='Most revolutions discarded with transient = "auto", "direct" or "shared"; by default 240.',
+        doc='Most revolutions discarded with transient = "auto" or "direct"; by default 240.',
         example="480",
         default=None,
         at_most=1_000_000,
@@ -169,12 +170,7 @@ class Recording:
     @property
     def is_transient_direct(self) -> bool:
         """Whether the transient ends where the periodic motion that follows is solved for."""
-        return self.transient in (DIRECT, SHARED)
-
-    @property
-    def is_transient_shared(self) -> bool:
-        """Whether that motion is one of those that all starts at one operating point may reach."""
-        return self.transient == SHARED
+        return self.transient == DIRECT
 
     @property
     def longest_transient(self) -> int:

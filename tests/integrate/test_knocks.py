@@ -30,7 +30,7 @@ speed_ratio = 1.22
 clearance = "300 um"
 friction = 0.0
 [record]
-transient = "shared"
+transient = "direct"
 revolutions = 4
 samples_per_revolution = 32
 """

@@ -8,6 +8,7 @@ import pytest
 
 from rubhpc import LumpedStator, read_rig, simulate
 from rubhpc.integrate import case, repeated_record
+from rubhpc.recent import forget
 from rubhpc.rig.reading import with_keys
 from rubhpc.schema import REGIME
 
@@ -36,8 +37,10 @@ def both(monkeypatch, rig, **given):
 
     with monkeypatch.context() as patch:
         patch.setattr(case, "repeat_period", noted)
+        forget()  # records of before
         repeated = simulate(rig, transient="direct", **given)
         patch.setattr(case, "repeat_period", lambda *_: (None, 0))
+        forget()
         marched = simulate(rig, transient="direct", **given)
     assert closed == [True]
     return repeated, marched
@@ -115,6 +118,7 @@ def test_a_period_that_does_not_close_is_not_repeated(monkeypatch):
     """The case goes on from the motion as a simulation, and its record is judged like any other."""
     closed = simulate("mokhtar2017", transient="direct", revolutions=6, **LIGHT, **TWICE)
     monkeypatch.setattr(repeated_record, "nothing", lambda _: 0.0)
+    forget()
     marched = simulate("mokhtar2017", transient="direct", revolutions=6, **LIGHT, **TWICE)
     assert (marched.period, marched.settled, REGIME[marched.regime]) == (2, 1, "periodic")
     assert marched.steps > closed.steps

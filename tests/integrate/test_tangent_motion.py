@@ -75,7 +75,7 @@ def test_tangent_is_that_of_the_saltation_matrices(rig, law):
     for _ in range(N_REVOLUTION):
         revolution = motion.revolve(begin, states)
         n_event += len(revolution.pieces) - 1
-        displacement = carried(motion, revolution, displacement[:, np.newaxis])[:, 0]
+        displacement = carried(motion, revolution.rows, displacement[:, np.newaxis])[:, 0]
         known.append(math.log(motion.size(displacement)))
         displacement /= motion.size(displacement)
         begin, states = revolution.end, revolution.states

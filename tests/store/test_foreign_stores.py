@@ -141,6 +141,12 @@ def test_attributes_of_other_types_are_refused(store: Path, attributes: dict[str
         open_store(store)
 
 
+def test_a_store_made_with_a_word_of_an_older_version_is_read(store: Path) -> None:
+    study = {"record": {"transient": "shared"}}
+    change(store, "", lambda metadata: metadata["attributes"].update(study=study))
+    assert json.loads(open_store(store).attrs["study"]) == study
+
+
 def test_control_characters_do_not_reach_the_reader(store: Path) -> None:
     red = "\x1b[31mred\x9b"
     change(store, "", lambda metadata: metadata["attributes"].update(title=red, own={"a": red}))

@@ -89,7 +89,7 @@ def follow(
                 history = [branching.moved(point, ahead) for point in history[-3:]]
             base = history[-1]
             if has_turned or len(history) == 1:
-                toward = np.append(np.zeros(base.motion.size), sense)
+                toward = sense * base.parameter_axis
                 if len(history) > 1:
                     toward = branching.difference(*history[-2:])
                 heading, history, has_turned = branching.tangent(base, toward), [base], False
@@ -103,8 +103,7 @@ def follow(
                 edge = low if value <= low else high if value >= high else 0.0
                 if value <= low or value >= high:
                     guess = guess * (edge - base.value) / (guess[-1] * branching.step)
-                    along = np.zeros_like(along)
-                    along[-1] = 1.0
+                    along = base.parameter_axis
                 try:
                     trial = branching.correct(base, guess, along, in_plane=ANYWHERE * length)
                 except NotConverged:
@@ -216,8 +215,7 @@ def _beyond(branching: Branching, history: list[Point], base: Point, grazing_poi
         if follows(found := weakly_impacting(branching, history)):
             return found
     sense = np.sign(grazing_point.value - history[0].value)
-    along = np.zeros(2 * grazing_point.case.n + 1)
-    along[-1] = 1.0
+    along = grazing_point.parameter_axis
     for steps in BEYOND:
         for direction in (sense, -sense):
             with suppress(NotConverged):
@@ -256,10 +254,8 @@ def _closing(branching: Branching, points: list[Point], base: Point, found: Poin
     if not 0.0 <= share <= 1.0 or found.motion.size != first.motion.size:
         return None
     change = branching.difference(base, found)
-    held = np.zeros(change.size)
-    held[-1] = 1.0
     try:
-        there = branching.correct(base, share * change, held)
+        there = branching.correct(base, share * change, base.parameter_axis)
     except NotConverged:
         return None
     return there if branching.is_same(there, first) else None

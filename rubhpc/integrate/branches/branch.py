@@ -9,6 +9,7 @@ import numpy as np
 
 from rubhpc.integrate.branches.events import Event
 from rubhpc.integrate.periodic_motion import record_of_period
+from rubhpc.integrate.periodic_motions.revolution import least_of
 from rubhpc.schema import BRANCH_EVENT
 
 if TYPE_CHECKING:
@@ -154,12 +155,13 @@ def branch_of(branching: Branching, track: Track, recording: Recording) -> Branc
 
 
 def _point(point: Point, event: Event) -> BranchPoint:
+    least_gap, least_force = least_of(point.revolutions)
     return BranchPoint(
         value=point.value,
         event=event.name.lower(),
         multipliers=point.multipliers,
         state=point.state,
-        least_gap=np.min([revolution.least_gap for revolution in point.revolutions], axis=0),
-        least_force=np.min([revolution.least_force for revolution in point.revolutions], axis=0),
-        touches=sum(piece.touching.size for revolution in point.revolutions for piece in revolution.pieces),
+        least_gap=least_gap,
+        least_force=least_force,
+        touches=sum(piece.touching.size for piece in point.pieces),
     )

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.errors import InputError
-from rubhpc.integrate.branches.point import SAME_MOTION, HeldCase, Point, away_from_events
-from rubhpc.integrate.periodic_motions.family import flow
+from rubhpc.integrate.branches.point import SAME_MOTION, Point, away_from_events
 from rubhpc.integrate.periodic_motions.piecewise_motion import Unfollowed
 from rubhpc.integrate.periodic_motions.saltation import monodromy
 from rubhpc.integrate.periodic_motions.shooting import NotConverged, shoot
@@ -22,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.integrate.periodic_motions.family import Family
+    from rubhpc.integrate.periodic_motions.revolution import Revolution
 
     Floats = NDArray[np.float64]
 
@@ -75,7 +75,7 @@ class Branching:
             motion=orbit.motion,
             states=orbit.states,
             revolutions=list(orbit.revolutions),
-            held=HeldCase(self.family, value, case),
+            family=self.family,
         )
         return self.moved(point, away_from_events(point))
 
@@ -89,8 +89,8 @@ class Branching:
             phase=phase,
             motion=motion,
             states=states,
-            revolutions=flow(point.case, motion, states, point.period, phase),
-            held=point.held,
+            revolutions=point.case.follow(motion, states, point.period, phase=phase),
+            family=point.family,
         )
 
     def repeated(self, point: Point, times: int) -> Point:
@@ -98,7 +98,7 @@ class Branching:
         if times == 1:
             return point
         n = times * point.period
-        revolutions = flow(point.case, point.motion, point.states, n, point.phase)
+        revolutions = point.case.follow(point.motion, point.states, n, phase=point.phase)
         return replace(point, revolutions=revolutions)
 
     def direction(self, point: Point, change: Floats) -> Floats:
@@ -126,13 +126,21 @@ class Branching:
                 return True
         return False
 
+    def rate(self, point: Point, share: float | None = None) -> tuple[Floats, list[Revolution]]:
+        """Derivative (2 n,) by the parameter, per step, of what a period leaves, at a fixed beginning.
+
+        Returned with the revolutions from this beginning a share of a step ahead, by which it is found.
+        """
+        step = None if share is None else share * self.step
+        given = point.value, point.motion, point.states, point.revolutions, point.phase
+        rate, followed = self.family.derivative(*given, step)
+        return rate * self.step, followed
+
     def tangent(self, point: Point, toward: Floats) -> Floats:
         """Direction of the branch at a point, in steps, of length 1 (2 n + 1,), in the sense of `toward`."""
-        rate = self.family.derivative(
-            point.value, point.motion, point.states, point.revolutions, point.phase
-        )  # fmt: skip
+        rate, _ = self.rate(point)
         moving = (point.monodromy - np.eye(point.motion.size)) / point.scale
-        matrix = np.column_stack([moving, rate * self.step])
+        matrix = np.column_stack([moving, rate])
         along: Floats = np.linalg.svd(matrix / np.abs(matrix).max(axis=1, keepdims=True))[2][-1]
         return along if along @ toward >= 0.0 else -along
 
@@ -209,14 +217,14 @@ class Branching:
             case = family.at(value)
             motion = family.carry(before, origin, case)
             for iteration in range(2 * most):
-                revolutions = flow(case, motion, states, period, phase)
+                revolutions = case.follow(motion, states, period, phase=phase)
                 defect = revolutions[-1].end - motion
                 residual = case.size(defect) / max(case.size(motion), np.finfo(float).tiny)
                 if residual <= CONVERGED and revolutions[-1].states == states:
                     self._n_found += 1
                     return Point(
                         value=value, phase=phase, motion=motion, states=states, revolutions=revolutions,
-                        held=HeldCase(family, value, case),
+                        family=family,
                     )  # fmt: skip
                 states = revolutions[-1].states
                 is_late = iteration >= most and residual > SOON
@@ -239,7 +247,7 @@ class Branching:
                     motion = motion + here
                     continue
                 if rate is None or rate.size != motion.size:
-                    rate = family.derivative(value, motion, states, revolutions, phase) * self.step
+                    rate = family.derivative(value, motion, states, revolutions, phase)[0] * self.step
                 ahead = np.append(
                     scale * (motion - family.carry(base.motion, base.case, case)),
                     (value - base.value) / self.step,

@@ -113,8 +113,7 @@ def halving(branching: Branching, a: Point, b: Point) -> Point | None:
     """
     change, was, now = branching.difference(a, b), half_change(a), half_change(b)
     share = float(was @ was / (was @ was - now @ was))
-    held = np.zeros(change.size)
-    held[-1] = 1.0
+    held = a.parameter_axis
     try:
         points = [branching.correct(a, share * change, held, period=a.period // 2)]
         values = [_above_minus_one(points[0])]

@@ -11,6 +11,7 @@ import numpy as np
 from rubhpc.integrate.branches.branching import IN_PLANE, STEEP
 from rubhpc.integrate.branches.events import LOCATED, Event, crossings, tolerance_of
 from rubhpc.integrate.branches.weak_impact import DEPTH, weakly_impacting
+from rubhpc.integrate.periodic_motions.revolution import least_of
 from rubhpc.integrate.periodic_motions.shooting import NotConverged
 
 if TYPE_CHECKING:
@@ -79,9 +80,8 @@ def touches(point: Point) -> Counter[int]:
 
 def distances(point: Point) -> Floats:
     """Distances to grazing: least gaps and speeds of approach over those of a whirl in the gap; forces, N."""
-    gap = np.min([revolution.least_gap for revolution in point.revolutions], axis=0)
-    force = np.min([revolution.least_force for revolution in point.revolutions], axis=0)
-    approach = [speed for r in point.revolutions for piece in r.pieces for speed in piece.approach.tolist()]
+    gap, force = least_of(point.revolutions)
+    approach = [speed for piece in point.pieces for speed in piece.approach.tolist()]
     clearance = np.maximum(point.case.bodies.clearance[: gap.size], np.finfo(float).tiny)
     whirl = abs(point.case.setup.spin) * float(clearance.max())
     return np.concatenate([gap / clearance, force, np.array(approach) / whirl])
@@ -237,8 +237,7 @@ def grazing_beside(branching: Branching, a: Point, b: Point) -> Grazing | None:
     if n_touch[0] == n_touch[1]:
         return None
     free, other = (a, b) if n_touch[0] < n_touch[1] else (b, a)
-    held = np.zeros(free.motion.size + 1)
-    held[-1] = 1.0
+    held = free.parameter_axis
     move = BESIDE[1] * max(abs(a.value - b.value) / branching.step, BESIDE[0])
     pair: list[tuple[float, Point]] = []
     try:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.periodic_motions.saltation import saltate
+from rubhpc.integrate.periodic_motions.revolution import cut, joined
+from rubhpc.integrate.periodic_motions.saltation import carried
 from rubhpc.kernels.mode_change import GAP_TOLERANCE
 
 if TYPE_CHECKING:
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from rubhpc.integrate.periodic_motions.revolution import Piece
 
     Floats = NDArray[np.float64]
-    Complexes = NDArray[np.complex128]
 
 LOOKS = 256  # samples of a revolution, among which the least gap is sought
 MOST_ITERATIONS, TURNED = 30, 1e-14  # of Newton's method for its time; accuracy as a share of a revolution
@@ -47,10 +46,10 @@ class LeastGap:
     def gradient(self) -> Floats:
         """Derivative (2 n,) of the gap with respect to the motion at the section."""
         case = self.point.case
-        mode = case.mode(_pieces(self.point)[self._place].states)
-        row = (mode.tables.switch_re + 1j * mode.tables.switch_im)[_switch(case, self.pair), mode.moving]
-        carried = row * np.exp(mode.exponent * self._time)
-        gradient: Floats = np.ascontiguousarray(carried).view(np.float64) @ mode.enter
+        tables, j = case.mode(self.point.pieces[self._place].states).tables, _switch(case, self.pair)
+        row = tables.switch_re[j] + 1j * tables.switch_im[j]
+        row = row * np.exp((tables.exponent[0] + 1j * tables.exponent[1]) * self._time)
+        gradient: Floats = tables.enter_re @ row.real - tables.enter_im @ row.imag
         return gradient @ self.point.tangents()[self._place - 1] if self._place else gradient
 
     def impact(self, depth: float) -> Floats:
@@ -59,28 +58,25 @@ class LeastGap:
         A wall at a depth p is hit with the speed `v = sqrt(2 p d)`, where d is the second derivative of the
         gap, and the pair parts at once. Closed pairs stay closed.
         """
-        case, pieces = self.point.case, _pieces(self.point)
-        piece, bodies = pieces[self._place], self.point.case.bodies
-        closed = case.mode(piece.states).is_closed.copy()
+        case, bodies = self.point.case, self.point.case.bodies
+        closed = case.mode(self.point.pieces[self._place].states).is_closed.copy()
         closed[self.pair] = True
         hit = np.flatnonzero(closed)
         speed = np.where(hit == self.pair, np.sqrt(2.0 * max(depth * self.bend, 0.0)), 0.0)
         gained = (1.0 + bodies.restitution) * speed
-        rows, directions = bodies.gap_jacobian[hit], bodies.force_direction[hit].T
+        normals, directions = bodies.gap_jacobian[hit], bodies.force_direction[hit].T
         change = np.zeros((2 * case.n, 1))
-        change[case.n :, 0] = directions @ np.linalg.solve(rows @ directions, gained)
-        change = case.mode(piece.states).propagator(piece.duration - self._time) @ change
-        for ended, following in pairwise(pieces[self._place :]):
-            if ended.crossing:
-                change = saltate(case, ended, following, change)
-            change = case.mode(following.states).propagator(following.duration) @ change
-        return np.asarray(change[:, 0])
+        change[case.n :, 0] = directions @ np.linalg.solve(normals @ directions, gained)
+        rows = cut(joined([one.rows for one in self.point.revolutions]), self._place, None)
+        times = rows.times.copy()
+        times[0, 1] -= self._time
+        return carried(case, rows._replace(times=times), change)[:, 0]
 
 
 def least_gap(point: Point, pair: int) -> LeastGap | None:
     """Find the least gap of a pair; None where the gap has no minimum in a piece of the period."""
     case, best = point.case, (np.inf, 0, 0.0)
-    pieces = _pieces(point)
+    pieces = point.pieces
     begins = [point.motion, *(piece.after for piece in pieces)]
     for place, (piece, begun) in enumerate(zip(pieces, begins, strict=False)):
         if not case.mode(piece.states).is_open[pair]:
@@ -108,10 +104,6 @@ def least_gap(point: Point, pair: int) -> LeastGap | None:
     return LeastGap(
         point=point, pair=pair, gap=float(gap[0]), bend=float(bend[0]), _place=place, _time=time
     )  # fmt: skip
-
-
-def _pieces(point: Point) -> list[Piece]:
-    return [piece for revolution in point.revolutions for piece in revolution.pieces]
 
 
 def _switch(case: PiecewiseMotion, pair: int) -> int:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
-from weakref import ref
 
 import numpy as np
 
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
 
     from rubhpc.integrate.periodic_motions.family import Family
     from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
-    from rubhpc.integrate.periodic_motions.revolution import Revolution
+    from rubhpc.integrate.periodic_motions.revolution import Piece, Revolution
     from rubhpc.integrate.record import State
 
     Floats = NDArray[np.float64]
@@ -30,26 +29,6 @@ NEAR_FOLD = 0.03  # distance of a multiplier from 1 within which the parameter i
 MAY_FOLD = 0.7  # a real multiplier beyond which a fold may be a step ahead
 REAL = 1e-6  # imaginary part below which a multiplier counts as real
 CENTRAL = 0.2  # share of an event-free piece at either end without a section
-
-
-class HeldCase:
-    """The case of a point, as long as the family has room: its tables are much larger than a point.
-
-    Later it is set up again.
-    """
-
-    def __init__(self, family: Family, value: float, case: PiecewiseMotion) -> None:
-        self._family, self._value, self._case = family, value, ref(case)
-        family.hold(case)
-
-    def __call__(self) -> PiecewiseMotion:
-        """The case."""
-        case = self._case()
-        if case is None:
-            case = self._family.at(self._value)
-            self._case = ref(case)
-            self._family.hold(case)
-        return case
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,8 +43,8 @@ class Point:
         Angle of the shaft, in revolutions, at which `motion` (2 n,) is taken, and `states` of the pairs.
     revolutions : list of Revolution
         As many as its period.
-    held : HeldCase
-        The case whose coordinates these are.
+    family : Family
+        Its case at the value is the one whose coordinates these are.
     """
 
     value: float
@@ -73,17 +52,27 @@ class Point:
     motion: Floats
     states: int
     revolutions: list[Revolution]
-    held: HeldCase
+    family: Family
 
     @property
     def case(self) -> PiecewiseMotion:
-        """The case whose motion this is, with its tables."""
-        return self.held()
+        """The case whose motion this is, set up again where the family had no room for it."""
+        return self.family.at(self.value)
 
     @property
     def period(self) -> int:
         """Revolutions."""
         return len(self.revolutions)
+
+    @property
+    def pieces(self) -> list[Piece]:
+        """Its linear pieces, of all revolutions."""
+        return [piece for revolution in self.revolutions for piece in revolution.pieces]
+
+    @property
+    def parameter_axis(self) -> Floats:
+        """A change by one step of the parameter alone, (2 n + 1,)."""
+        return np.append(np.zeros(self.motion.size), 1.0)
 
     def tangents(self) -> list[Floats]:
         """Derivatives (2 n, 2 n), by the motion, of the motion after each piece and its event."""
@@ -152,12 +141,7 @@ class Point:
 
         It begins with the smallest, so that it does not depend on the section.
         """
-        events = [
-            (piece.states, tuple(piece.touching.tolist()))
-            for revolution in self.revolutions
-            for piece in revolution.pieces
-            if piece.crossing
-        ]
+        events = [(piece.states, tuple(piece.touching.tolist())) for piece in self.pieces if piece.crossing]
         if not events:
             return ((self.states, ()),)
         return min(tuple(events[k:] + events[:k]) for k in range(len(events)))
@@ -168,7 +152,7 @@ def away_from_events(point: Point) -> float:
 
     An impact at the section would make the motion there jump.
     """
-    turn, pieces = point.case.turn, [piece for r in point.revolutions for piece in r.pieces]
+    turn, pieces = point.case.turn, point.pieces
     times = np.cumsum([piece.duration for piece in pieces]) / turn
     events = np.array([time for time, piece in zip(times, pieces, strict=True) if piece.crossing])
     if not events.size:

@@ -72,8 +72,7 @@ def search(
 
 def lies_on(branching: Branching, track: Track, point: Point) -> bool:
     """Whether a motion is one of a track."""
-    held = np.zeros(point.motion.size + 1)
-    held[-1] = 1.0
+    held = point.parameter_axis
     for a, b in zip(track.points, track.points[1:], strict=False):
         if (a.value - point.value) * (b.value - point.value) > 0.0 or a.period != point.period:
             continue
@@ -123,10 +122,8 @@ def _halved(branching: Branching, track: Track) -> Iterator[Point]:
         point = track.points[k]
         if track.events[k] in (Event.PERIOD_DOUBLING, Event.GRAZING) and has_halved(point):
             half = replace(point, revolutions=point.revolutions[: point.period // 2])
-            held = np.zeros(point.motion.size + 1)
-            held[-1] = 1.0
             try:
-                yield branching.correct(half, 0.0 * held, held)
+                yield branching.correct(half, 0.0 * point.parameter_axis, point.parameter_axis)
             except NotConverged:
                 continue
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.integrate.branches.least_gap import least_gap
-from rubhpc.integrate.periodic_motions.family import flow
 from rubhpc.integrate.periodic_motions.piecewise_motion import Unfollowed
+from rubhpc.integrate.periodic_motions.revolution import least_of
 from rubhpc.integrate.periodic_motions.shooting import NotConverged
 
 if TYPE_CHECKING:
@@ -59,7 +59,13 @@ def weakly_impacting(branching: Branching, free: Sequence[Point], share: float =
     least = least_gap(base, pair)
     if least is None or abs(least.gap - gap) > ALIKE * gap:
         raise NotConverged("the least gap does not turn")
-    rate, ended = _rates(branching, base, pair, min(SMALL, PART * gap / clearance))
+    small = min(SMALL, PART * gap / clearance)
+    try:
+        ended, ahead = branching.rate(base, small)
+    except Unfollowed as problem:
+        raise NotConverged(str(problem)) from None
+    was, now = (float(least_of(some)[0][pair]) for some in (base.revolutions, ahead))
+    rate = (now - was) / small
     row = np.append(least.gradient / base.scale, rate)
     if not np.isfinite(row).all() or rate == 0.0:
         raise NotConverged("the least gap has no derivative")
@@ -83,7 +89,7 @@ def _beside(branching: Branching, free: Sequence[Point]) -> tuple[Point, int, fl
     def nearly(points: Iterable[Point]) -> tuple[Point, int, float, float] | None:
         found = []
         for point in points:
-            gap = _least_gaps(point)
+            gap, _ = least_of(point.revolutions)
             clearance = np.abs(point.case.bodies.clearance[: gap.size])
             pair = int(np.argmin(gap / clearance))
             if NEAR[0] * clearance[pair] < gap[pair] < NEAR[1] * clearance[pair]:
@@ -98,23 +104,3 @@ def _beside(branching: Branching, free: Sequence[Point]) -> tuple[Point, int, fl
         if (found := nearly([moved])) is not None:
             return found
     raise NotConverged("no gap is about to close")
-
-
-def _least_gaps(point: Point) -> Floats:
-    """Least gaps (q,), m, over a period."""
-    return np.asarray(np.min([revolution.least_gap for revolution in point.revolutions], axis=0))
-
-
-def _rates(branching: Branching, point: Point, pair: int, small: float) -> tuple[float, Floats]:
-    """Derivatives by the parameter, per step, at a fixed beginning: of a least gap, m, and the end (2 n,)."""
-    family = branching.family
-    try:
-        there = family.at(point.value + small * branching.step)
-        begun = family.carry(point.motion, point.case, there)
-        revolutions = flow(there, begun, point.states, point.period, point.phase)
-    except Unfollowed as problem:
-        raise NotConverged(str(problem)) from None
-    gap = min(float(revolution.least_gap[pair]) for revolution in revolutions)
-    defect = family.carry(revolutions[-1].end, there, point.case) - family.carry(begun, there, point.case)
-    apart = point.revolutions[-1].end - point.motion
-    return (gap - float(_least_gaps(point)[pair])) / small, (defect - apart) / small

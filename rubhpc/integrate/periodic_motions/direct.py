@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import cached_property
 from itertools import islice
 from typing import TYPE_CHECKING
 
@@ -12,11 +11,10 @@ import numpy as np
 from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.marches.modal import Place
 from rubhpc.integrate.measuring.orbit_measures import LONGEST_PERIOD
+from rubhpc.integrate.periodic_motions.approach import nothing
 from rubhpc.integrate.periodic_motions.extrapolation import extrapolated
-from rubhpc.integrate.periodic_motions.known_motions import LINEAR, SAME, SHARE, Approach, Found, nothing
-from rubhpc.integrate.periodic_motions.onward import Onward
 from rubhpc.integrate.periodic_motions.shooting import NotConverged, Orbit, shoot
-from rubhpc.integrate.periodic_motions.walk import LEADING, LOOK, Passed, Walk
+from rubhpc.integrate.periodic_motions.transient_case import LEADING, Passed, TransientCase
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator
@@ -24,8 +22,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.integrate.marches.event_driven import EventDrivenMarch
-    from rubhpc.integrate.periodic_motions.known_motions import KnownMotions
     from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
+    from rubhpc.integrate.periodic_motions.solved_motion import SolvedMotion, SolvedMotions
     from rubhpc.integrate.record import State
     from rubhpc.study.study import Recording
 
@@ -39,6 +37,8 @@ SHARE_MORE = 8  # in which part of its revolutions, if that is more, it goes on 
 NEARER = 0.3  # of its distance after one revolution: a return as near as that speaks for a longer period
 PATIENCE = 16  # such periods that are simulated before it is sought: a search costs several times as much
 MOST_ITERATIONS, LEAST_STEP = 10, 1 / 4  # of Newton's method
+SHARE = 0.5  # of what the linear theory takes from its distance: the most that it strays from that
+LINEAR = 0.1  # of its distance, by which it may stray from the theory from one look to the next
 LOST = 3 / 4  # of what the linear theory takes from its distance, that it loses at least
 FAR = 1e-2  # of the square of its distance, until which the linear theory must keep its contacts
 AGAIN = 0.7  # of that square, at which they are looked at once more
@@ -51,14 +51,13 @@ def pass_directly(
     march: EventDrivenMarch,
     solve_from: Callable[[State | None, EventDrivenMarch], PiecewiseMotion],
     recording: Recording,
-    known: KnownMotions | None = None,
+    motions: SolvedMotions,
 ) -> Passed:
     """March until a stable periodic motion is found that the case draws near to; go on from that motion.
 
     After 64, 128, 256, ... revolutions the periodic motion is solved for from where the last ones lead to
     (`extrapolation`), if that nearly closes. Where the case is seen to draw near to it, in these revolutions
     or in further ones (`draws_near`), it goes over; else it goes on, at the latest to the longest transient.
-    Where motions are known, the case is compared with them first (`Walk.arrive`).
 
     Parameters
     ----------
@@ -66,114 +65,95 @@ def pass_directly(
         The case at its beginning.
     solve_from : callable
         Makes its piecewise motion from a state, or from where a march of the case has come.
-    known : KnownMotions, optional
-        Motions that the case may reach.
+    motions : SolvedMotions
+        Of this operating point.
     """
-    walk, wanted = Walk(march, recording), FIRST
+    case, wanted = TransientCase(march, recording), FIRST
     piecewise: PiecewiseMotion | None = None
     missed: list[Candidate] = []  # motions that were found, and that the case did not draw near to
     while True:
-        if known is not None:
-            reached, reason = walk.arrive(known, wanted)
-            if reached is not None or reason is not None:
-                return walk.ended(reason, reached)
-        reason = walk.on(wanted - walk.n_revolution)
-        if reason is not None or walk.n_left <= 0:
-            return walk.ended(reason)
-        wanted = int(LONGER * walk.n_revolution)
-        walk.stand()
-        piecewise = piecewise or _piecewise(walk, solve_from)
+        reason = case.simulate(wanted - case.n_revolution)
+        if reason is not None or case.n_left <= 0:
+            return case.ended(reason)
+        wanted = int(LONGER * case.n_revolution)
+        case.stay()
+        piecewise = piecewise or _piecewise(case, solve_from)
         if piecewise is None:
             continue
-        for candidate in _candidates(piecewise, walk, missed):
-            orbit = candidate.orbit
-            if candidate.strays(walk.passed) > LEFT:
+        for candidate in _candidates(piecewise, case, missed, motions):
+            if candidate.strays(case.passed) > LEFT:
                 candidate.n_missed += 1
                 continue
-            is_near, reason = draws_near(walk, candidate, int(FURTHER * walk.n_revolution))
-            if is_near and known is not None and (same := known.nearest(orbit.motion, SAME)) is not None:
-                return walk.ended(reason, same)
+            is_near, reason = draws_near(case, candidate, int(FURTHER * case.n_revolution))
             if is_near:
+                orbit = candidate.solved.orbit
                 force = piecewise.contact_force(orbit.states, orbit.motion)
-                walk.begin_at(piecewise.setup, Place(orbit.motion, piecewise.setup.model.sag, force))
-            if is_near or reason is not None:
-                found = Found(piecewise, orbit, candidate.approach) if is_near else None
-                return walk.ended(reason, found=found)
+                case.continue_at(piecewise.setup, Place(orbit.motion, piecewise.setup.model.sag, force))
+                return case.ended(None, candidate.solved)
+            if reason is not None:
+                return case.ended(reason)
             candidate.n_missed += 1
 
 
 class Candidate:
-    """A periodic motion that a case may draw near to if it is stable, and the linear theory about it.
+    """A periodic motion that a case may draw near to if it is stable.
 
     Attributes
     ----------
-    n_period : int
-        Periods from one look to the next.
+    there : float
+        Distance at which a case has arrived.
     n_missed : int
         How often the case was seen not to draw near.
     """
 
-    def __init__(self, piecewise: PiecewiseMotion, orbit: Orbit) -> None:
+    def __init__(self, piecewise: PiecewiseMotion, solved: SolvedMotion) -> None:
         """Take a motion that was found."""
-        self.piecewise, self.orbit, self.period = piecewise, orbit, orbit.period
-        self.n_period = max(1, LOOK // orbit.period)
+        self.piecewise, self.solved = piecewise, solved
+        self.there = nothing(piecewise.setup) * piecewise.size(solved.orbit.motion)
         self.n_missed = 0
 
     def strays(self, passed: Floats) -> float:
-        """Distance of the last motion from where the theory takes that a period before, over its distance."""
-        if len(passed) <= self.period:
+        """Distance of the last motion from where the theory takes that a period before, over its distance.
+
+        A case that has arrived does not stray: its distance is rounding.
+        """
+        orbit, size = self.solved.orbit, self.piecewise.size
+        if len(passed) <= orbit.period:
             return math.inf
-        before, apart = passed[-1 - self.period] - self.orbit.motion, passed[-1] - self.orbit.motion
-        left = self.piecewise.size(apart - self.orbit.monodromy @ before)
-        return left / max(self.piecewise.size(before), np.finfo(float).tiny)
-
-    @property
-    def is_doubled(self) -> bool:
-        """Whether it is unstable, and the largest disturbance changes sides in every period."""
-        return not self.approach.is_stable and self.orbit.multipliers[0].real < -1.0
-
-    @cached_property
-    def approach(self) -> Approach:
-        """Distances from it."""
-        return Approach.to(self.piecewise, self.orbit.monodromy)
-
-    @cached_property
-    def to_next_look(self) -> Floats:
-        """Derivative of the motion at a look by that at the one before, (2 n, 2 n)."""
-        return np.linalg.matrix_power(self.orbit.monodromy, self.n_period)
-
-    @cached_property
-    def onward(self) -> Onward:
-        """Contacts of cases near it."""
-        return Onward(self.piecewise, self.orbit, self.approach)
+        before, apart = passed[-1 - orbit.period] - orbit.motion, passed[-1] - orbit.motion
+        if size(apart) <= self.there:
+            return 0.0
+        return size(apart - orbit.monodromy @ before) / max(size(before), np.finfo(float).tiny)
 
 
-def _candidates(piecewise: PiecewiseMotion, walk: Walk, missed: list[Candidate]) -> Iterator[Candidate]:
+def _candidates(
+    piecewise: PiecewiseMotion, case: TransientCase, missed: list[Candidate], motions: SolvedMotions
+) -> Iterator[Candidate]:
     """Motions that a case may draw near to now: one that was found too early, then what a search finds.
 
     Each that was found is taken up once more, if the last period is nearly what the linear theory about it
     makes of the one before.
     """
-    again = (one for one in missed if one.n_missed == 1 and one.strays(walk.passed) <= STRAYS)
+    again = (one for one in missed if one.n_missed == 1 and one.strays(case.passed) <= STRAYS)
     yield from islice(again, 1)
-    walk.stand()
-    found = _search(piecewise, walk.states, walk.passed, walk.n_revolution, {one.period for one in missed})
+    case.stay()
+    found = _search(piecewise, case, {one.solved.period for one in missed}, motions)
     if found is not None:
         missed.append(found)
         yield found
 
 
 def _piecewise(
-    walk: Walk, solve_from: Callable[[State | None, EventDrivenMarch], PiecewiseMotion]
+    case: TransientCase, solve_from: Callable[[State | None, EventDrivenMarch], PiecewiseMotion]
 ) -> PiecewiseMotion | None:
     """What motions of the case are followed with; None where it has no closed form."""
     try:
-        return solve_from(None, walk.march)
+        return solve_from(None, case.march)
     except NoClosedForm:
         return None
 
 
-def draws_near(walk: Walk, candidate: Candidate, until: int) -> tuple[bool, str | None]:
+def draws_near(case: TransientCase, candidate: Candidate, until: int) -> tuple[bool, str | None]:
     """Whether a case draws near to a stable motion, in its last revolutions or further ones.
 
     Returned with why it cannot go on. Its distance (`Approach`) is to fall from one look to the next, four
@@ -181,20 +161,20 @@ def draws_near(walk: Walk, candidate: Candidate, until: int) -> tuple[bool, str 
     takes it from the one before, to a tenth of its distance; and what it has strayed from the theory in these
     looks (root of the sum of squares) is to be less than half of what it loses by it, of which three quarters
     are to be lost. Then the theory is believed if it keeps the contacts: until a tenth of the distance is
-    left, none may come or go that the motion has not (`Onward`). A motion that beats about another one, or
-    only passes by, does not draw near so. It is watched until so many revolutions have passed, or
+    left, none may come or go that the motion has not (`ContactsNearby`). A motion that beats about another
+    one, or only passes by, does not draw near so. It is watched until so many revolutions have passed, or
     it disobeys the theory in further ones.
     """
-    piecewise, orbit, approach = candidate.piecewise, candidate.orbit, candidate.approach
-    span, onward = candidate.n_period * orbit.period, candidate.to_next_look
+    piecewise, solved = candidate.piecewise, candidate.solved
+    orbit, approach = solved.orbit, solved.approach
+    span, to_next_look = solved.n_period * orbit.period, solved.to_next_look
     least = -(-WATCHED // span)
-    there = nothing(piecewise.setup) * piecewise.size(orbit.motion)
     looks: list[tuple[float, float, float]] = []  # what it strays, is to lose and loses, as shares
     is_further = candidate.n_missed > 0  # what was found before must lead the case at once
     untried = math.inf  # square of the distance at which contacts are looked at next
-    seen = walk.passed[::-1][::span][::-1] - orbit.motion  # its distances from one look to the next
+    seen = case.passed[::-1][::span][::-1] - orbit.motion  # its distances from one look to the next
     while True:
-        foreseen = seen[:-1] @ onward.T
+        foreseen = seen[:-1] @ to_next_look.T
         square, k = approach.squares(np.concatenate([seen, seen[1:] - foreseen, foreseen])), len(seen)
         strays, expected, square = square[k : 2 * k - 1], square[2 * k - 1 :], square[:k]
         for was, last, stray, less in zip(square[:-1], square[1:], strays, expected, strict=True):
@@ -203,23 +183,23 @@ def draws_near(walk: Walk, candidate: Candidate, until: int) -> tuple[bool, str 
             else:
                 looks.append((stray / was, _fall(was, less), _fall(was, last)))
         apart, last = seen[-1], square[-1]
-        if piecewise.size(apart) <= there:
+        if piecewise.size(apart) <= candidate.there:
             return True, None
         if last <= untried and _agree(looks, least):
-            walk.stand()
-            if candidate.onward.keeps_contacts(apart, share=FAR):
+            case.stay()
+            if solved.contacts(piecewise).keeps_contacts(apart, share=FAR):
                 return True, None
             untried = AGAIN * last
         if is_further and not looks:
             return False, None
         is_further = True
-        n_look = -(-max(WATCHED, walk.n_revolution // SHARE_MORE) // span)
-        n_look = min(n_look, walk.n_left // span)
-        if walk.n_revolution >= until or n_look < 1:
+        n_look = -(-max(WATCHED, case.n_revolution // SHARE_MORE) // span)
+        n_look = min(n_look, case.n_left // span)
+        if case.n_revolution >= until or n_look < 1:
             return False, None
-        if (reason := walk.on(n_look * span)) is not None:
+        if (reason := case.simulate(n_look * span)) is not None:
             return False, reason
-        seen = walk.passed[::-1][::span][: n_look + 1][::-1] - orbit.motion
+        seen = case.passed[::-1][::span][: n_look + 1][::-1] - orbit.motion
 
 
 def _fall(before: float, after: float) -> float:
@@ -238,22 +218,23 @@ def _agree(looks: list[tuple[float, float, float]], least: int) -> bool:
 
 
 def _search(
-    piecewise: PiecewiseMotion, states: int, passed: Floats, n_revolution: int, missed: Collection[int]
+    piecewise: PiecewiseMotion, case: TransientCase, missed: Collection[int], motions: SolvedMotions
 ) -> Candidate | None:
     """Return the stable periodic motion that the last ones lead to: as they return, or of one revolution.
 
     The first that they may follow to, else of two the nearer one. An unstable motion whose disturbances
     change sides in every period is followed to twice its period. Periods that were `missed` before come last.
     """
-    found: list[tuple[float, Candidate]] = []
-    for period in sorted(_periods(piecewise, passed, n_revolution), key=missed.__contains__):
-        one = _solved(piecewise, states, passed, asked := period)
+    passed, found = case.passed, list[tuple[float, Candidate]]()
+    for period in sorted(_periods(piecewise, passed, case.n_revolution), key=missed.__contains__):
+        one = _solved(piecewise, case, asked := period, motions)
         while one and one.is_doubled and (asked := 2 * asked) <= LONGEST_PERIOD:
-            one = _solved(piecewise, states, passed, asked)
+            one = _solved(piecewise, case, asked, motions)
         if one and one.approach.is_stable:
-            if one.strays(passed) <= STRAYS:
-                return one
-            found.append((piecewise.size(one.orbit.motion - passed[-1]), one))
+            candidate = Candidate(piecewise, one)
+            if candidate.strays(passed) <= STRAYS:
+                return candidate
+            found.append((piecewise.size(one.orbit.motion - passed[-1]), candidate))
     return min(found, key=lambda one: one[0])[1] if found else None
 
 
@@ -267,12 +248,15 @@ def _periods(piecewise: PiecewiseMotion, passed: Floats, n_revolution: int) -> l
     return [*(np.flatnonzero(back[1:] <= NEARER**2 * back[:1]) + 2)[:1].tolist(), 1]
 
 
-def _solved(piecewise: PiecewiseMotion, states: int, passed: Floats, period: int) -> Candidate | None:
+def _solved(
+    piecewise: PiecewiseMotion, case: TransientCase, period: int, motions: SolvedMotions
+) -> SolvedMotion | None:
     """Periodic motion that the last ones lead to, a period apart; None where none is found."""
-    try:
-        orbit = shoot(
+
+    def shoot_from(motion: Floats, states: int, period: int) -> Orbit:
+        return shoot(
             piecewise,
-            extrapolated(passed[::-1][::period][: LEADING + 1][::-1], piecewise.energy),
+            motion,
             states,
             period,
             most_iterations=MOST_ITERATIONS,
@@ -281,6 +265,9 @@ def _solved(piecewise: PiecewiseMotion, states: int, passed: Floats, period: int
             most_residual=CLOSING,
             watches_turns=False,
         )
+
+    leading = extrapolated(case.passed[::-1][::period][: LEADING + 1][::-1], piecewise.energy)
+    try:
+        return motions.of(piecewise, shoot_from(leading, case.states, period), shoot_from)
     except (NoClosedForm, NotConverged):
         return None
-    return Candidate(piecewise, orbit)

@@ -15,7 +15,6 @@ from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.packing import law_of
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion, Unfollowed
-from rubhpc.integrate.periodic_motions.saltation import by_clearance
 from rubhpc.integrate.record import State
 from rubhpc.integrate.reduced_model.along_speeds import AlongSpeeds
 from rubhpc.integrate.reduced_model.reduction import reduce_to
@@ -39,7 +38,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 SPEEDS, CLEARANCES = ("speed_ratio", "speed"), ("clearance_ratio", "clearance")
-MOST_KEPT = 6  # cases that are kept
+MOST_KEPT = 6  # models and set-ups that are kept, and cases in any case
 ROOM = 256_000_000  # bytes of the tables of further ones
 WITH_MODES = 2.2  # bytes of tables and modes, as solved and for pieces, over those of tables
 DIFFERENCE = 1e-6  # of the range, between the two cases of a derivative
@@ -101,7 +100,6 @@ class Family:
         self._frequency: tuple[Model, float] | None = None
         self._setups: OrderedDict[tuple[int, float, bool], ModalSetup] = OrderedDict()
         self._cases: OrderedDict[float, PiecewiseMotion] = OrderedDict()
-        self._held: OrderedDict[int, PiecewiseMotion] = OrderedDict()  # by id
 
     def at(self, value: float) -> PiecewiseMotion:
         """The case at a value of the parameter.
@@ -120,18 +118,9 @@ class Family:
             except NoClosedForm:
                 raise Unfollowed("contacts open and close without end, or in too many combinations") from None
             self._cases[value] = found
-            if len(self._cases) > MOST_KEPT:
-                self._forget(self._cases.popitem(last=False)[1])
+            self._make_room()
         self._cases.move_to_end(value)
         return self._cases[value]
-
-    def hold(self, case: PiecewiseMotion) -> None:
-        """Keep a case while there is room, the latest ones first."""
-        self._held[id(case)] = case
-        self._held.move_to_end(id(case))
-        room = ROOM - sum(map(_size, self._held.values()))  # they grow while they are used
-        while room < 0 and len(self._held) > 1:
-            room += _size(self._held.popitem(last=False)[1])
 
     def settings(self, value: float, *, is_measured: bool = True) -> tuple[ModalSetup, float, float]:
         """Set-up, clearance (m) and friction at a value; to record, or only to follow."""
@@ -165,32 +154,34 @@ class Family:
         return np.concatenate([project @ (displacement + shift), project @ velocity])[:, 0]
 
     def derivative(
-        self, value: float, motion: Floats, states: int, revolutions: list[Revolution], phase: float
-    ) -> Floats:
+        self,
+        value: float,
+        motion: Floats,
+        states: int,
+        revolutions: list[Revolution],
+        phase: float,
+        step: float | None = None,
+    ) -> tuple[Floats, list[Revolution]]:
         """Derivative (2 n,) by the parameter of the residual of a period, at a fixed beginning.
 
-        It is exact for the clearance; for other parameters it is the difference of two flow maps.
+        It is the difference of two flow maps over a step, a millionth of the range by default; those of the
+        second are returned with it.
         """
-        here = self.at(value)
-        if self.along in CLEARANCES:
-            return self._clearance_rate(here) * by_clearance(here, revolutions)
-        step = DIFFERENCE * self.span
-        there = self.at(value + step)
+        step = DIFFERENCE * self.span if step is None else step
+        here, there = self.at(value), self.at(value + step)
         begun = self.carry(motion, here, there)
-        ended = flow(there, begun, states, len(revolutions), phase)[-1].end
-        defect = self.carry(ended, there, here) - self.carry(begun, there, here)
-        return (defect - (revolutions[-1].end - motion)) / step
+        followed = there.follow(begun, states, len(revolutions), phase=phase)
+        defect = self.carry(followed[-1].end, there, here) - self.carry(begun, there, here)
+        return (defect - (revolutions[-1].end - motion)) / step, followed
 
-    def _forget(self, case: PiecewiseMotion) -> None:
-        """Free the contact modes of one friction in a shared set-up."""
-        if self.along == "friction":
-            case.setup.forget(float(case.bodies.friction[0]))
-
-    def _clearance_rate(self, here: PiecewiseMotion) -> float:
-        """Metres of clearance for a unit of the parameter."""
-        if self.along == "clearance":
-            return 1.0
-        return contact_free_amplitude(here.setup.model, here.setup.spin)
+    def _make_room(self) -> None:
+        """Give up the cases that have not been used for longest, unless there are few, or room for them."""
+        room = ROOM - sum(map(_size, self._cases.values()))  # they grow while they are used
+        while room < 0 and len(self._cases) > MOST_KEPT:
+            case = self._cases.popitem(last=False)[1]
+            room += _size(case)
+            if self.along == "friction":  # contact modes of one friction in a shared set-up
+                case.setup.forget(float(case.bodies.friction[0]))
 
     def _spin(self, case: Operation, model: Model) -> float:
         """Speed of a case, rad/s."""
@@ -277,14 +268,3 @@ class Family:
 def _size(case: PiecewiseMotion) -> float:
     """Bytes of its tables and modes."""
     return WITH_MODES * sum(table.nbytes for table in case.march.tables if isinstance(table, np.ndarray))
-
-
-def flow(
-    piecewise: PiecewiseMotion, motion: Floats, states: int, period: int, phase: float
-) -> list[Revolution]:
-    """Follow a motion (2 n,) for some revolutions from an angle of the shaft, given in revolutions."""
-    found: list[Revolution] = []
-    for _ in range(period):
-        found.append(piecewise.revolve(motion, states, phase=phase))
-        motion, states = found[-1].end, found[-1].states
-    return found

@@ -68,7 +68,7 @@ def exponents(
     grown = np.zeros(n_exponent)
     for i_revolution in range(aligning + followed):
         revolution = piecewise.revolve(motion, states)
-        columns, triangle = np.linalg.qr(weight * carried(piecewise, revolution, columns / weight))
+        columns, triangle = np.linalg.qr(weight * carried(piecewise, revolution.rows, columns / weight))
         motion, states = revolution.end, revolution.states
         if i_revolution >= aligning:
             size = np.abs(np.diag(triangle))

@@ -17,11 +17,10 @@ if TYPE_CHECKING:
     from rubhpc.kernels.contact_modes import ModeTables
 
 Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 
 class Mode(NamedTuple):
-    """A contact mode: q pairs, n reduced degrees, m coordinates of which c move with the motion.
+    """A contact mode: q pairs, m coordinates.
 
     Attributes
     ----------
@@ -31,15 +30,10 @@ class Mode(NamedTuple):
         Pairs that are closed, and those that are watched for their gap.
     gaps : int
         Bits of the switch functions that are gaps.
+    n_moving : int
+        Coordinates up to the last that moves with the motion.
     tables : PieceTables
         What a piece is followed with.
-    moving : (c,)
-        These coordinates.
-    exponent : (c,), 1/s
-    shape : (2 n, c)
-        Motion of unit coordinates, its real part.
-    enter : (2 c, 2 n)
-        Coordinates of a unit motion: their real parts, each with the negative of its imaginary part below.
     unit_length : (l, 2, m)
         Coordinates besides for each unit length: the clearances, and a 1 under set-valued friction.
     """
@@ -48,17 +42,9 @@ class Mode(NamedTuple):
     is_closed: NDArray[np.bool_]
     is_open: NDArray[np.bool_]
     gaps: int
+    n_moving: int
     tables: PieceTables
-    moving: NDArray[np.int64]
-    exponent: Complexes
-    shape: Complexes
-    enter: Floats
     unit_length: Floats
-
-    def propagator(self, duration: float) -> Floats:
-        """Derivative (2 n, 2 n) of the motion by that a time (s) before; it keeps closed gaps closed."""
-        moved = self.shape * np.exp(self.exponent * duration)
-        return np.asarray(moved.view(np.float64) @ self.enter)
 
 
 def mode_of(march: EventDrivenMarch, states: int) -> Mode:
@@ -107,7 +93,7 @@ def unknown_modes(tables: ModeTables) -> PieceModes:
 def know(modes: PieceModes, mode: Mode) -> None:
     """Fill in the row of a mode."""
     place, tables = mode.place, mode.tables
-    modes.gaps[place], modes.n_moving[place] = mode.gaps, mode.moving.max(initial=-1) + 1
+    modes.gaps[place], modes.n_moving[place] = mode.gaps, mode.n_moving
     modes.exponent[place], modes.drift[place] = tables.exponent, tables.drift
     modes.floor[place], modes.kind[place] = tables.floor, tables.kind
     modes.offset[place] = tables.offset
@@ -153,18 +139,13 @@ def _read_mode(march: EventDrivenMarch, states: int) -> Mode:
         translations=march.bodies.translations,
         displacement_limit=march.bodies.displacement_limit,
     )
-    enter = followed.enter_re + 1j * followed.enter_im
-    moving = np.flatnonzero(enter.any(axis=0))
-    shape = (followed.shape_re + 1j * followed.shape_im)[:, moving]
+    is_moving = (followed.enter_re != 0.0).any(axis=0) | (followed.enter_im != 0.0).any(axis=0)
     return Mode(
         place=place,
         is_closed=is_closed,
         is_open=is_open,
         gaps=march.gaps_watched(states),
+        n_moving=int(np.flatnonzero(is_moving).max(initial=-1)) + 1,
         tables=followed,
-        moving=moving,
-        exponent=exponent[0, moving] + 1j * exponent[1, moving],
-        shape=np.ascontiguousarray(shape),
-        enter=np.ascontiguousarray(enter.conj()[:, moving]).view(np.float64).T.copy(),
         unit_length=unit_length,
     )

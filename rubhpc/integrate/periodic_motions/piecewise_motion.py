@@ -16,7 +16,6 @@ from rubhpc.integrate.periodic_motions.revolution import (
     Piece,
     Revolution,
     copied,
-    first_of,
     longer,
     whole_revolutions,
 )
@@ -249,15 +248,6 @@ class PiecewiseMotion:
         mode = self.mode(states)
         force = self.march.forces(mode.place, self.enter(mode, 0.0, motion))
         return np.where(mode.is_closed, np.maximum(force, np.finfo(float).tiny), 0.0)
-
-    def switch(self, mode: Mode, crossing: int, re: Floats, im: Floats) -> float:
-        """First switch function that vanishes, of coordinates (m,), real and imaginary."""
-        j = first_of(crossing)
-        return float(mode.tables.switch_re[j] @ re - mode.tables.switch_im[j] @ im)
-
-    def unit_clearance(self, mode: Mode) -> Floats:
-        """What a clearance greater by 1 m at every pair adds to coordinates (2, m)."""
-        return np.asarray(mode.unit_length[: self.q].sum(axis=0))
 
     def what_changes(self, piece: Piece) -> list[tuple[int, Change]]:
         """Pairs that an event at the end of a piece concerns, and what becomes of them."""

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels.flow import BEFORE, GRADIENT, RATE_BEGUN, RATE_ENDED
+from rubhpc.kernels.flow import BEFORE
 from rubhpc.kernels.revolutions import AFTER, PieceRows, piece_rows
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 Floats = NDArray[np.float64]
 
@@ -30,18 +32,10 @@ class Piece(NamedTuple):
         Since the shaft passed its angle 0, and until the event or the end of the revolution.
     crossing : int
         Bits of the switch functions that vanish at the end; 0 where the revolution ends.
-    rate_begun, rate_ended : (2 n,)
-        Rate of the motion at the beginning, and at the end before the event.
     before, after : (2 n,)
         Reduced displacements and velocities at the end, before and after the event.
-    gradient : (2 n,)
-        Of the first switch function that vanishes, by the motion; of no meaning where none does.
-    switch_rate : float
-        Its rate, its unit per second.
     touching, approach : (k,)
         Pairs whose gaps close at the end, and their speeds of approach, m/s.
-    given : (2, q)
-        Normal impulses of the event and tractions, N s.
     states_after : int
         What goes on.
     """
@@ -50,14 +44,9 @@ class Piece(NamedTuple):
     begin: float
     duration: float
     crossing: int
-    rate_begun: Floats
-    rate_ended: Floats
     before: Floats
-    gradient: Floats
-    switch_rate: float
     touching: NDArray[np.int64]
     approach: Floats
-    given: Floats
     after: Floats
     states_after: int
 
@@ -93,15 +82,11 @@ class Revolution:
         """Its pieces."""
         stride = self.rows.rates.shape[1] // self.least_gap.size
         rows = self.rows
-        return [
-            _piece(stride, *row)
-            for row in zip(rows.states.tolist(), rows.times.tolist(), *rows[2:], strict=True)
-        ]
+        columns = rows.states.tolist(), rows.times.tolist(), rows.motions, rows.rates
+        return [_piece(stride, *row) for row in zip(*columns, strict=True)]
 
 
-def _piece(
-    stride: int, states: list[int], times: list[float], motions: Floats, rates: Floats, given: Floats
-) -> Piece:
+def _piece(stride: int, states: list[int], times: list[float], motions: Floats, rates: Floats) -> Piece:
     """Return the piece of a row; a pair has its switch functions `stride` apart."""
     before, crossing, gaps, after = states
     touching, approach = NO_PAIR, NO_SPEED
@@ -113,22 +98,18 @@ def _piece(
         begin=times[0],
         duration=times[1],
         crossing=crossing,
-        rate_begun=motions[RATE_BEGUN],
-        rate_ended=motions[RATE_ENDED],
         before=motions[BEFORE],
-        gradient=motions[GRADIENT],
-        switch_rate=float(rates[first_of(crossing)]) if crossing else math.nan,
         touching=touching,
         approach=approach,
-        given=given,
         after=motions[AFTER],
         states_after=after,
     )
 
 
-def first_of(crossing: int) -> int:
-    """Index of the lowest bit."""
-    return (crossing & -crossing).bit_length() - 1
+def least_of(revolutions: Iterable[Revolution]) -> tuple[Floats, Floats]:
+    """Smallest gap and force (q,), m and N, of each pair where it turns between events; inf: none."""
+    gaps, forces = zip(*((one.least_gap, one.least_force) for one in revolutions), strict=True)
+    return np.min(gaps, axis=0), np.min(forces, axis=0)
 
 
 def whole_revolutions(rows: PieceRows, least: Floats) -> list[Revolution]:
@@ -140,15 +121,9 @@ def whole_revolutions(rows: PieceRows, least: Floats) -> list[Revolution]:
     ]
 
 
-def cut(rows: PieceRows, first: int, last: int) -> PieceRows:
-    """Rows from the first up to the last, which is not among them."""
-    return PieceRows(
-        states=rows.states[first:last],
-        times=rows.times[first:last],
-        motions=rows.motions[first:last],
-        rates=rows.rates[first:last],
-        given=rows.given[first:last],
-    )
+def cut(rows: PieceRows, first: int, last: int | None) -> PieceRows:
+    """Rows from the first up to the last, which is not among them; None: up to the end."""
+    return PieceRows._make(part[first:last] for part in rows)
 
 
 def joined(rows: list[PieceRows]) -> PieceRows:
@@ -158,13 +133,7 @@ def joined(rows: list[PieceRows]) -> PieceRows:
 
 def copied(rows: PieceRows, k: int) -> PieceRows:
     """Copy the first k rows."""
-    return PieceRows(
-        states=rows.states[:k].copy(),
-        times=rows.times[:k].copy(),
-        motions=rows.motions[:k].copy(),
-        rates=rows.rates[:k].copy(),
-        given=rows.given[:k].copy(),
-    )
+    return PieceRows._make(part[:k].copy() for part in rows)
 
 
 def longer(rows: PieceRows) -> PieceRows:

@@ -12,7 +12,7 @@ from rubhpc.integrate.branches.arclength import follow
 from rubhpc.integrate.branches.branching import Branching
 from rubhpc.integrate.initial_state import fit_to_gaps
 from rubhpc.integrate.periodic_motions import family as family_module
-from rubhpc.integrate.periodic_motions.family import MOST_KEPT, Family, Operation, flow
+from rubhpc.integrate.periodic_motions.family import MOST_KEPT, Family, Operation
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.reduced_model.truncation import SMOOTH
 from rubhpc.study.contact_keys import Contact
@@ -85,11 +85,10 @@ def test_points_let_go_of_the_tables_of_their_cases(monkeypatch):
     first = Branching(family, 3e-7).begin(1.06e-4, case.start, case.states, 2)
     track = follow(Branching(family, 3e-7), [first], 1.0, low=1.05e-4, high=1.2e-4, most=30)
     assert len(track.points) == 30
-    alive = {id(held) for point in track.points if (held := point.held._case()) is not None}
-    assert len(alive) <= MOST_KEPT
+    assert len(family._cases) == MOST_KEPT
     point = track.points[3]
-    assert id(point.held._case()) not in alive
-    again = flow(point.case, point.motion, point.states, 2, point.phase)
+    assert point.value not in family._cases
+    again = point.case.follow(point.motion, point.states, 2, phase=point.phase)
     assert np.array_equal(again[-1].end, point.revolutions[-1].end)
 
 
@@ -135,14 +134,14 @@ def test_derivative_by_the_clearance_is_that_of_two_flows(along):
     state = fit_to_gaps(motion.state, setup, clearance)
     begun = PiecewiseMotion(setup, clearance, friction, state)
     point = Branching(family, 1.0).begin(value, begun.start, begun.states, 2)
-    exact = family.derivative(value, point.motion, point.states, point.revolutions, point.phase)
+    found, _ = family.derivative(value, point.motion, point.states, point.revolutions, point.phase)
     step = 1e-10 / unit
     up, down = (
-        flow(family.at(value + sign * step), point.motion, point.states, 2, point.phase)[-1].end
+        family.at(value + sign * step).follow(point.motion, point.states, 2, phase=point.phase)[-1].end
         for sign in (1, -1)
     )
     expected = (up - down) / (2 * step)
-    assert exact == pytest.approx(expected, abs=1e-6 * np.abs(expected).max())
+    assert found == pytest.approx(expected, abs=1e-6 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("law", [{}, {"friction_law": "coulomb", "law": "penalty", "stiffness": 1e7}])
@@ -154,7 +153,7 @@ def test_cases_along_a_speed_share_a_basis_and_are_followed_as_they_are_recorded
     setup, clearance, friction = family.settings(0.75)
     recorded = PiecewiseMotion(setup, clearance, friction, rubhpc.State.at_rest(setup.model))
     begun = recorded.start, recorded.states
-    ends = [flow(case, *begun, 1, 0.0)[-1] for case in (here, recorded)]
+    ends = [case.revolve(*begun) for case in (here, recorded)]
     assert len(ends[0].pieces) > 1
     assert np.array_equal(ends[0].end, ends[1].end)
 

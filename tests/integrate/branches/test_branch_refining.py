@@ -32,7 +32,8 @@ class Curve:
             value=float(self._value(x)), phase=0.0, period=1, motion=np.array([x]), sequence=events,
             multipliers=np.array([multiplier], dtype=complex), n_unstable=int(abs(multiplier) > 1.0),
             may_fold=False, staying_closed=np.full((2, 1), np.inf),
-            revolutions=[SimpleNamespace(least_gap=least, least_force=np.array([np.inf]), pieces=[])],
+            revolutions=[SimpleNamespace(least_gap=least, least_force=np.array([np.inf]))],
+            pieces=[],
             case=SimpleNamespace(
                 q=1, setup=SimpleNamespace(spin=1.0), bodies=SimpleNamespace(clearance=np.ones(1))
             ),

@@ -8,7 +8,7 @@ import pytest
 import rubhpc
 from rubhpc.integrate.branches.branching import Branching
 from rubhpc.integrate.branches.least_gap import least_gap
-from rubhpc.integrate.periodic_motions.family import Family, Operation, flow
+from rubhpc.integrate.periodic_motions.family import Family, Operation
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.study.contact_keys import Contact
 from rubhpc.study.tables import Integrator
@@ -34,9 +34,8 @@ def point():
 def moved(point, change):
     """The same revolutions of a motion that begins elsewhere: no periodic one."""
     motion = point.motion + change
-    return replace(
-        point, motion=motion, revolutions=flow(point.case, motion, point.states, point.period, point.phase)
-    )
+    revolutions = point.case.follow(motion, point.states, point.period, phase=point.phase)
+    return replace(point, motion=motion, revolutions=revolutions)
 
 
 def test_gradient_is_that_of_differences(point):

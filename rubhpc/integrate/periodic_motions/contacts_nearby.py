@@ -14,7 +14,7 @@ from rubhpc.kernels.watching import N_PART, N_TIME, watch_pieces
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.periodic_motions.known_motions import Approach
+    from rubhpc.integrate.periodic_motions.approach import Approach
     from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
     from rubhpc.integrate.periodic_motions.shooting import Orbit
     from rubhpc.kernels.revolutions import PieceRows
@@ -25,7 +25,7 @@ PER_REVOLUTION = 64  # times at which gaps and forces are looked at
 MOST_PERIODS = 4000  # that the linear theory is followed
 
 
-class Onward:
+class ContactsNearby:
     """Gaps and forces along a periodic motion, and of cases near it period by period, to first order.
 
     Events move in time; what must not happen is one more, or one less.

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from rubhpc.integrate.periodic_motions import direct
-from rubhpc.integrate.periodic_motions.known_motions import Approach
-from rubhpc.integrate.periodic_motions.onward import PER_REVOLUTION, Onward
+from rubhpc.integrate.periodic_motions.approach import Approach
+from rubhpc.integrate.periodic_motions.contacts_nearby import PER_REVOLUTION, ContactsNearby
 from rubhpc.simulate import simulate
 
 
@@ -17,9 +17,9 @@ def settled():
     found = []
     draws_near = direct.draws_near
 
-    def note(walk, candidate, until):
-        found.append((candidate.piecewise, candidate.orbit))
-        return draws_near(walk, candidate, until)
+    def note(case, candidate, until):
+        found.append((candidate.piecewise, candidate.solved.orbit))
+        return draws_near(case, candidate, until)
 
     case = {
         "speed_ratio": 1.6, "clearance_ratio": 0.74, "friction": 0.33, "samples_per_revolution": 64,
@@ -33,8 +33,8 @@ def settled():
     return piecewise, orbit, piecewise.march.reduced(first) - orbit.motion
 
 
-def onward_of(piecewise, orbit):
-    return Onward(piecewise, orbit, Approach.to(piecewise, orbit.monodromy))
+def contacts_of(piecewise, orbit):
+    return ContactsNearby(piecewise, orbit, Approach.to(piecewise, orbit.monodromy))
 
 
 def sequence(piecewise, orbit, apart):
@@ -44,8 +44,8 @@ def sequence(piecewise, orbit, apart):
 def test_gaps_and_forces_nearby_are_those_of_the_motion_to_first_order(settled):
     """Of a thousandth of the distance, where a piece begins at the section: no event before moves it."""
     piecewise, orbit, apart = settled
-    onward, small = onward_of(piecewise, orbit), 1e-3 * apart
-    watched, n = onward.watched, int(onward.watched.parts[0, 1])
+    contacts, small = contacts_of(piecewise, orbit), 1e-3 * apart
+    watched, n = contacts.watched, int(contacts.watched.parts[0, 1])
     piece = orbit.revolutions[0].pieces[0]
     mode = piecewise.mode(piece.states)
     z = piecewise.enter(mode, 0.0, orbit.motion + small)
@@ -61,9 +61,9 @@ def test_another_contact_comes_where_it_is_foreseen(settled):
     """Least share of the distance at which the order of contacts is another one: 1.11 predicted, 1.44 met."""
     piecewise, orbit, apart = settled
     apart = apart * piecewise.size(orbit.motion) / piecewise.size(apart)
-    onward, usual = onward_of(piecewise, orbit), sequence(piecewise, orbit, 0.0 * apart)
+    contacts, usual = contacts_of(piecewise, orbit), sequence(piecewise, orbit, 0.0 * apart)
     shares = np.arange(0.1, 3.0, 0.1)
-    foreseen = [onward.keeps_contacts(share * apart, 1) for share in shares]
+    foreseen = [contacts.keeps_contacts(share * apart, 1) for share in shares]
     met = [sequence(piecewise, orbit, share * apart) == usual for share in shares]
     assert foreseen[0]
     assert met[0]
@@ -74,7 +74,7 @@ def test_another_contact_comes_where_it_is_foreseen(settled):
 def test_all_periods_ahead_are_looked_at(settled):
     """A disturbance that meets another contact only when its phase has come round."""
     piecewise, orbit, apart = settled
-    onward, shares = onward_of(piecewise, orbit), np.arange(0.2, 8.0, 0.2)
+    contacts, shares = contacts_of(piecewise, orbit), np.arange(0.2, 8.0, 0.2)
     random, later = np.random.default_rng(3), 0
     unit = np.repeat([1.0 / piecewise.setup.spin, 1.0], piecewise.n)
     for _ in range(3):
@@ -82,16 +82,16 @@ def test_all_periods_ahead_are_looked_at(settled):
         apart *= piecewise.size(orbit.motion) / piecewise.size(apart)
         for share in shares:
             at, period = share * apart, 0
-            while period < 64 and onward.keeps_contacts(at, 1):
+            while period < 64 and contacts.keeps_contacts(at, 1):
                 at, period = orbit.monodromy @ at, period + 1
-            assert onward.keeps_contacts(share * apart, 64) == (period == 64)
+            assert contacts.keeps_contacts(share * apart, 64) == (period == 64)
             later += 0 < period < 64
     assert later > 0
 
 
 def test_times_are_spread_over_the_revolution(settled):
     piecewise, orbit, _ = settled
-    parts = onward_of(piecewise, orbit).watched.parts
+    parts = contacts_of(piecewise, orbit).watched.parts
     counts = (parts[:, 1] - parts[:, 0]).tolist()
     assert len(counts) == len(orbit.revolutions[0].pieces)
     assert sum(counts) == pytest.approx(PER_REVOLUTION, abs=len(counts))
