@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from rubhpc.kernels.friction_states import FrictionBodies
     from rubhpc.kernels.pieces import Pieces
     from rubhpc.kernels.sampling import Recorder
-    from rubhpc.kernels.transitions import Transitions
 
 Floats = NDArray[np.float64]
 
@@ -50,7 +49,6 @@ def advance_friction(
     recorder: Recorder,
     samples: Samples,
     accumulator: Accumulator,
-    transitions: Transitions,
 ) -> int:
     """Advance a case through `pieces` if there are any, by `sections` if there are any, else to `last_tick`.
 
@@ -71,14 +69,14 @@ def advance_friction(
     if pieces.spin.size > 0:
         return advance_friction_pieces(
             tables, reduced, bodies, clock, pieces, progress, z, z_next, motion, work, recorder, samples,
-            sums, transitions,
+            sums,
         )  # fmt: skip
     if sections.shape[0] > 0:
         return advance_friction_sections(
             tables, reduced, bodies, clock, limit, energy_limit, progress, z, z_next, motion, work, recorder,
-            samples, accumulator, sections, transitions,
+            samples, accumulator, sections,
         )  # fmt: skip
     return advance_with_friction(
         tables, reduced, bodies, clock, last_tick, is_recorded, progress, z, z_next, motion, work, recorder,
-        samples, accumulator, transitions,
+        samples, accumulator,
     )  # fmt: skip

@@ -16,7 +16,6 @@ from rubhpc.kernels.case_progress import Clock, Progress  # noqa: TC001 - part o
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE, ModeTables
 from rubhpc.kernels.event_search import move_ticks
 from rubhpc.kernels.force_average import AVERAGING_TIME
-from rubhpc.kernels.friction_coordinates import used_width
 from rubhpc.kernels.friction_spans import (
     AFTER,
     BEFORE,
@@ -30,8 +29,6 @@ from rubhpc.kernels.peak_search import follow_force, recent_impulse
 from rubhpc.kernels.sampling import Recorder, read_samples, widen_extrema
 from rubhpc.kernels.span_energies import add_losses, add_rubs
 from rubhpc.kernels.span_forces import begin_force, pass_force
-from rubhpc.kernels.span_samples import read_noted
-from rubhpc.kernels.transitions import Transitions  # noqa: TC001 - part of a kernel's signature
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
@@ -48,7 +45,6 @@ def observe_spans(
     recorder: Recorder,
     samples: Samples,
     accumulator: Accumulator,
-    transitions: Transitions,
 ) -> None:
     """Measure the spans that are kept: samples, energies, forces and friction, and make room for others."""
     spans, near = recorder.spans, int(AVERAGING_TIME / clock.tick) + 1
@@ -67,11 +63,9 @@ def observe_spans(
                 spans.alike[n_alike] = s
                 n_alike += 1
                 spans.mode[s] = -1 - mode
-        add_losses(tables, clock, mode, n_alike, recorder, accumulator, transitions)
-        observe_parts(
-            tables, bodies, clock, mode, n_alike, first_sample, recorder, samples, accumulator, transitions
-        )
-        add_rubs(tables, bodies, clock, mode, n_alike, spans, accumulator, transitions)
+        add_losses(tables, clock, mode, n_alike, recorder, accumulator)
+        observe_parts(tables, bodies, clock, mode, n_alike, first_sample, recorder, samples, accumulator)
+        add_rubs(tables, bodies, clock, mode, n_alike, spans, accumulator)
     if n_span > 0:
         last = spans.tick[n_span - 1, 1]
         progress.next_sample = max(first_sample, ((last - 1) >> level) + 1)
@@ -142,20 +136,16 @@ def observe_parts(
     recorder: Recorder,
     samples: Samples,
     accumulator: Accumulator,
-    transitions: Transitions,
 ) -> None:
     """Read the samples of the spans `alike` in a contact mode, and the forces in the parts between them.
 
-    `first_sample` is the first one of all spans. Outputs that are tabulated by rows are read for several
-    samples at once, others one by one, or ahead while no pair is closed.
+    `first_sample` is the first one of all spans. Samples are read one by one, or ahead while no pair is
+    closed.
     """
-    spans, level, is_tabulated = recorder.spans, clock.sample_level, False
-    if transitions.mode.size > 0:
-        is_tabulated = transitions.output[mode] >= 0
+    spans, level = recorder.spans, clock.sample_level
     states, n_row = tables.mask[mode], recorder.value.size // SAMPLES_AT_ONCE
-    used, interval, n_noted = used_width(tables, mode), clock.tick * (1 << level), 0
-    at_once = 1
-    if states == 0 and not is_tabulated:
+    interval, at_once = clock.tick * (1 << level), 1
+    if states == 0:
         at_once = min(SAMPLES_AT_ONCE, max(1, (1 << (tables.power_re.shape[1] - 1)) >> level))
     for place in range(n_alike):
         s = spans.alike[place]
@@ -163,8 +153,7 @@ def observe_parts(
         time = (end - begin) * clock.tick
         here, spare = spans.path[0], spans.path[1]
         copy_coordinates(spans.begun[s], here)
-        if not is_tabulated:
-            copy_coordinates(here, spare)
+        copy_coordinates(here, spare)
         for i in range(bodies.rim_speed.size):
             if state_of(states, i) != OPEN:
                 begin_force(tables, bodies, mode, i, time, min(time, interval), here, spans.pair[s, i])
@@ -173,31 +162,23 @@ def observe_parts(
             following = (now >> level) + 1
             if now == (now >> level) << level and now >> level >= first_sample:
                 sample = now >> level
-                if is_tabulated:
-                    if n_noted == SAMPLES_AT_ONCE:
-                        read_noted(transitions, mode, n_noted, used, n_row, first_sample, spans, samples)
-                        n_noted = 0
-                    spans.sample[n_noted] = sample
-                    copy_used(used, here, spans.point[n_noted])
-                    n_noted += 1
-                else:
-                    count = min(at_once, ((end - 1) >> level) + 1 - sample)
-                    read_samples(
-                        tables.output,
-                        mode,
-                        here[0],
-                        here[1],
-                        sample,
-                        count,
-                        recorder.value,
-                        samples.rotor,
-                        samples.axial,
-                        samples.lateral,
-                        samples.probe,
-                    )
-                    at, following = (sample - first_sample) * n_row, sample + count
-                    for k in range(count * n_row):
-                        spans.value[at + k] = recorder.value[k]
+                count = min(at_once, ((end - 1) >> level) + 1 - sample)
+                read_samples(
+                    tables.output,
+                    mode,
+                    here[0],
+                    here[1],
+                    sample,
+                    count,
+                    recorder.value,
+                    samples.rotor,
+                    samples.axial,
+                    samples.lateral,
+                    samples.probe,
+                )
+                at, following = (sample - first_sample) * n_row, sample + count
+                for k in range(count * n_row):
+                    spans.value[at + k] = recorder.value[k]
             stop = min(end, following << level)
             there = spare
             if stop == end:
@@ -214,13 +195,3 @@ def observe_parts(
                     samples.force[i, now >> level] += force[IMPULSE] / interval
                     accumulator.impulse[i] += force[IMPULSE]
             here, spare, now, part = there, here, stop, part + 1
-    if n_noted > 0:
-        read_noted(transitions, mode, n_noted, used, n_row, first_sample, spans, samples)
-
-
-@jit_inline_sum
-def copy_used(used: int, z: Floats, target: Floats) -> None:
-    """Copy the coordinates (2, m) that are used."""
-    for part in range(2):
-        for k in range(used):
-            target[part, k] = z[part, k]

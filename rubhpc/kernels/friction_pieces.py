@@ -53,7 +53,6 @@ from rubhpc.kernels.pieces import (
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
     from rubhpc.kernels.sampling import Recorder
-    from rubhpc.kernels.transitions import Transitions
 
 Floats = NDArray[np.float64]
 
@@ -76,12 +75,10 @@ def advance_friction_pieces(
     recorder: Recorder,
     samples: Samples,
     sums: Accumulator,
-    transitions: Transitions,
 ) -> int:
     """Advance a case through pieces, as `piece_loop.advance_pieces` does.
 
-    `bodies.rim_speed` is that of `reduced`; `bodies.turned` is set. There are no `transitions`: modes change
-    from piece to piece.
+    `bodies.rim_speed` is that of `reduced`; `bodies.turned` is set.
 
     Returns
     -------
@@ -133,7 +130,6 @@ def advance_friction_pieces(
                 recorder,
                 samples,
                 part,
-                transitions,
             )
             if outcome != FINISHED:
                 return outcome

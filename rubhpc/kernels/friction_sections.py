@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from rubhpc.kernels.event_forces import FrictionWork
     from rubhpc.kernels.friction_states import FrictionBodies
     from rubhpc.kernels.sampling import Recorder
-    from rubhpc.kernels.transitions import Transitions
 
 Floats = NDArray[np.float64]
 
@@ -40,7 +39,6 @@ def advance_friction_sections(
     samples: Samples,
     accumulator: Accumulator,
     sections: Floats,
-    transitions: Transitions,
 ) -> int:
     """Advance from the tick reached to tick 0 as `sections_loop.advance_sections` does.
 
@@ -70,7 +68,6 @@ def advance_friction_sections(
             recorder,
             samples,
             accumulator,
-            transitions,
         )
         if outcome != FINISHED:
             return outcome

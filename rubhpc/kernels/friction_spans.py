@@ -20,8 +20,6 @@ Ints = NDArray[np.int64]
 MOST_SPANS = 128
 MOST_PARTS = 1024  # of the spans, which samples part
 LONGEST = 128  # samples after which a span is ended without an event
-ROWS_AT_ONCE = 4  # of outputs
-AT_ONCE = 12  # spans for which a form is read once, a multiple of four
 BEFORE, AFTER, IMPULSE, MOST = range(4)  # columns of `Spans.force`
 # Columns of `Spans.pair`. Of the force where a part begins: value, N, primitive, N s, steady part, N, growth,
 # N/s, and by how much its means may exceed a parabola, N. Then the integral of the friction of a pair that
@@ -44,10 +42,6 @@ class Spans(NamedTuple):
     pair: Floats  # (n_span, q, 6), of pairs
     path: Floats  # (4, 2, m), coordinates within a span
     alike: Ints  # (n_span,), spans in one contact mode
-    sample: Ints  # (SAMPLES_AT_ONCE,), samples that are not read yet
-    point: Floats  # (SAMPLES_AT_ONCE, 2, m), coordinates there
-    read: Floats  # (SAMPLES_AT_ONCE whole_rows(o),), their outputs
-    gained: Floats  # (product_forms.AT_ONCE,), by forms in some spans
 
 
 def no_spans() -> Spans:
@@ -74,16 +68,7 @@ def _with_room(n_span: int, n_part: int, m: int, q: int, n_row: int) -> Spans:
         pair=np.zeros((n_span, q, 6)),
         path=np.zeros((4, 2, m)),
         alike=np.zeros(n_span, dtype=np.int64),
-        sample=np.zeros(SAMPLES_AT_ONCE, dtype=np.int64),
-        point=np.zeros((SAMPLES_AT_ONCE, 2, m)),
-        read=np.zeros(SAMPLES_AT_ONCE * whole_rows(n_row)),
-        gained=np.zeros(AT_ONCE),
     )
-
-
-def whole_rows(n_row: int) -> int:
-    """How many output rows are read: a multiple of four."""
-    return -(-n_row // ROWS_AT_ONCE) * ROWS_AT_ONCE
 
 
 @jit_inline

@@ -22,7 +22,6 @@ from rubhpc.kernels.coordinate_steps import floor_log2, turn_on
 from rubhpc.kernels.friction_spans import copy_coordinates
 from rubhpc.kernels.mode_change import AT_REST, product
 from rubhpc.kernels.trail import Trail  # noqa: TC001 - part of a kernel's signature
-from rubhpc.kernels.transitions import UNKNOWN, Transitions, add_impulses, pass_over, see
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -95,7 +94,6 @@ def carry_along(
     per_revolution: int,
     trail: Trail,
     modes: TrailModes,
-    transitions: Transitions,
     tangent: Tangent,
 ) -> int:
     """Propagate a displacement along a trail: `tangent.grown.size` revolutions of `per_revolution` ticks.
@@ -165,24 +163,10 @@ def carry_along(
             add_rate(shift, exponent, drift, z, d)
             forced = tables.n_eigenmode[place]
             cosine_rate, sine_rate = d[0, forced], d[1, forced]
-        strikes, passed = is_touching and reduced.spring == 0.0, UNKNOWN
-        if transitions.mode.size > 0:
-            passed = transitions.entry[place, next_place]
-        if passed >= 0:
-            q, m = reduced.radius.size, d.shape[1]
-            if strikes:
-                for i in range(q):
-                    tangent.rate[0, i], tangent.rate[1, i], _, _ = see(transitions, place, m, i, m, d)
-                strike(reduced, True, trail.given[k], trail.rate[k], tangent)
-            pass_over(transitions, passed, m, d, z)
-            if strikes:
-                add_impulses(transitions, next_place, q, m, tangent.given, z)
-            copy_coordinates(z, d)
-        else:
-            read_displacement(tables, place, tangent)
-            if strikes:
-                strike_motion(reduced, modes.has_states, trail.given[k], trail.rate[k], tangent)
-            enter_displacement(tables, next_place, cosine_rate, sine_rate, tangent)
+        read_displacement(tables, place, tangent)
+        if is_touching and reduced.spring == 0.0:
+            strike_motion(reduced, modes.has_states, trail.given[k], trail.rate[k], tangent)
+        enter_displacement(tables, next_place, cosine_rate, sine_rate, tangent)
         if shift != 0.0:
             copy_coordinates(trail.begun[k + 1], z)
             add_rate(-shift, modes.exponent[following], modes.drift[following], z, d)

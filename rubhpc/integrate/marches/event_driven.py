@@ -19,7 +19,6 @@ from rubhpc.kernels.piece_loop import advance_pieces
 from rubhpc.kernels.pieces import FAST, QUICK
 from rubhpc.kernels.sections_loop import advance_sections
 from rubhpc.kernels.trail import Trail, begin_trail, new_trail, no_trail
-from rubhpc.kernels.transitions import NO_TRANSITIONS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -33,7 +32,6 @@ if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
     from rubhpc.kernels.case_progress import Progress
     from rubhpc.kernels.pieces import Pieces
-    from rubhpc.kernels.transitions import Transitions
 
     Floats = NDArray[np.float64]
 
@@ -76,11 +74,6 @@ class EventDrivenMarch(ContactSets):
         displacement = place.motion[: self.bodies.stiffness.shape[0]]
         open_: Floats = self._at_rest - sag_at_stators(setup.model)[0]
         return open_ + self.bodies.gap_jacobian @ displacement
-
-    @property
-    def transitions(self) -> Transitions:
-        """Transitions between the contact modes of the tables that are tabulated: none."""
-        return NO_TRANSITIONS
 
     def reached_in(self) -> tuple[int, Floats]:
         """Set of contacts in which the case stands, and a copy of its modal coordinates (2, m)."""
