@@ -191,6 +191,13 @@ def enter(
     )
 
 
+@jit_part_sum
+def leave(tables: ModeTables, mode: int, z: Floats, motion: Floats) -> None:
+    """Reduced motion (2 n,) of the coordinates `z` (2, m) in a contact mode."""
+    for row in range(motion.size):
+        motion[row] = dot(tables.motion_re[mode, row], tables.motion_im[mode, row], z[0], z[1])
+
+
 @jit_lean_sum
 def enter_rest(
     motion_re: Floats,

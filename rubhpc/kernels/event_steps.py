@@ -15,11 +15,11 @@ from rubhpc.kernels.contact_modes import (
     SAMPLES_AT_ONCE,
     ModeTables,
     Reduced,
-    dot,
     enter,
     enter_rest,
     find_mode,
     is_beyond,
+    leave,
 )
 from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.measuring import end_span
@@ -197,9 +197,7 @@ def leave_mode(
 
     Returns False where the motion diverges.
     """
-    mode = progress.mode
-    for k in range(motion.size):
-        motion[k] = dot(tables.motion_re[mode, k], tables.motion_im[mode, k], z[0], z[1])
+    leave(tables, progress.mode, z, motion)
     return end_mode(tables, reduced, clock, is_recorded, progress, z, motion, impulse, recorder, accumulator)
 
 

@@ -16,12 +16,11 @@ from rubhpc.kernels.case_progress import (
     shaft_turn,
 )
 from rubhpc.kernels.complementarity import UNSOLVED
-from rubhpc.kernels.contact_modes import FORCED_LEVEL, ModeTables, Reduced, is_beyond
+from rubhpc.kernels.contact_modes import FORCED_LEVEL, ModeTables, Reduced, is_beyond, leave
 from rubhpc.kernels.contact_pairs import Workspace  # noqa: TC001 - likewise
 from rubhpc.kernels.coulomb_friction import ROUNDING
 from rubhpc.kernels.event_forces import FrictionWork, solve_expected
 from rubhpc.kernels.event_steps import count_event, record_touch
-from rubhpc.kernels.friction_coordinates import leave_states
 from rubhpc.kernels.friction_events import (
     bring_to_rest,
     collide,
@@ -30,7 +29,6 @@ from rubhpc.kernels.friction_events import (
     rate_without_forces,
     see_pairs,
 )
-from rubhpc.kernels.friction_spans import note_impulse
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, FrictionBodies, state_of
 from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.soft_friction_events import press_pairs
@@ -66,7 +64,7 @@ def take_change(
         UNDER_WAY, DIVERGED or CONTACT_UNSOLVED.
     """
     count_event(clock, progress)
-    leave_states(tables, progress.mode, z, motion)
+    leave(tables, progress.mode, z, motion)
     if is_beyond(reduced, motion):
         return DIVERGED
     if is_recorded:
@@ -82,7 +80,7 @@ def take_change(
         for i in range(work.impulse.size):
             gained = accumulator.impulse[i] - work.impulse[i]
             samples.force[i, progress.tick >> clock.sample_level] += gained / interval
-            note_impulse(recorder.spans, i, gained)
+            recorder.span.given[i] = gained
             if wanted >= 0:
                 record_touch(i, state_of(wanted, i) != OPEN, accumulator)
     note_event(work.trail, progress.tick, crossing)

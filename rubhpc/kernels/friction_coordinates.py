@@ -1,19 +1,13 @@
-"""Coordinates of a contact mode under set-valued friction: entered, left, and their energies.
-
-As `contact_modes.enter` and `measuring.end_span`, of the coordinates that a set of states uses alone:
-pairs that stick leave a quarter of the tables' width empty, and events cost what is read of them.
-"""
+"""Coordinates that a contact mode uses under set-valued friction, and their energies."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum, short_loops
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.accumulators import DAMPING_LOSS, UNBALANCE_WORK, Accumulator
-from rubhpc.kernels.case_progress import NONE, Clock, Progress, shaft_turn
-from rubhpc.kernels.contact_modes import ModeTables, Reduced, add_rows, dot, enter_rest, find_mode
-from rubhpc.kernels.mode_change import GAP_TOLERANCE
+from rubhpc.kernels.contact_modes import ModeTables  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
 
 Floats = NDArray[np.float64]
@@ -29,90 +23,6 @@ def used_width(tables: ModeTables, mode: int) -> int:
     """
     used = tables.n_eigenmode[mode] + 2 + tables.switch_re.shape[1]
     return int(min((used + LANES - 1) // LANES * LANES, tables.switch_re.shape[2]))
-
-
-@jit_inline_sum
-@short_loops
-def enter_states(
-    tables: ModeTables, reduced: Reduced, clock: Clock, progress: Progress, motion: Floats, z: Floats
-) -> bool:
-    """Enter the contact mode wanted with the reduced motion (2 n,); False where the mode is not tabulated."""
-    mode = find_mode(tables.mask, progress.wanted)
-    if mode < 0:
-        return False
-    clearance = reduced.clearance
-    cosine, sine = shaft_turn(clock, progress.tick)
-    used = used_width(tables, mode)
-    for part in range(2):
-        rows = tables.enter_re[mode] if part == 0 else tables.enter_im[mode]
-        target = z[part, :used]
-        from_cosine, from_sine = tables.enter_cosine[mode, part], tables.enter_sine[mode, part]
-        n_whole = clearance.size - clearance.size % 2
-        for k in range(used):
-            target[k] = -from_cosine[k] * cosine - from_sine[k] * sine
-        for i in range(0, n_whole, 2):  # two at a time: the target would be read and written for each
-            source, other = tables.enter_constant[mode, i, part], tables.enter_constant[mode, i + 1, part]
-            constant, next_constant = clearance[i], clearance[i + 1]
-            for k in range(used):
-                target[k] -= source[k] * constant + other[k] * next_constant
-        for i in range(n_whole, clearance.size):
-            source, constant = tables.enter_constant[mode, i, part], clearance[i]
-            for k in range(used):
-                target[k] -= source[k] * constant
-        add_rows(rows, motion, target)
-        z[part, used:] = 0.0
-    begin_states(tables, mode, clearance, cosine, sine, progress, z)
-    if reduced.overlap > GAP_TOLERANCE:
-        enter_rest(
-            tables.motion_re[mode],
-            tables.motion_im[mode],
-            tables.enter_re[mode],
-            tables.enter_im[mode],
-            motion,
-            z,
-        )
-    return True
-
-
-@jit_inline_sum
-def begin_states(
-    tables: ModeTables,
-    mode: int,
-    clearance: Floats,
-    cosine: float,
-    sine: float,
-    progress: Progress,
-    z: Floats,
-) -> None:
-    """Begin in a contact mode: fill in the coordinates (2, m) that do not move."""
-    first = tables.n_eigenmode[mode]
-    z[0, first], z[1, first] = cosine, sine
-    for i in range(clearance.size):
-        z[0, first + 1 + i], z[1, first + 1 + i] = clearance[i], 0.0
-    progress.mode, progress.wanted, progress.entered = mode, NONE, progress.tick
-    progress.contact_age, progress.halving_level, progress.is_after_event = NONE, NONE, 1
-
-
-@jit_inline_sum
-@short_loops
-def leave_states(tables: ModeTables, mode: int, z: Floats, motion: Floats) -> None:
-    """Fill the reduced motion (2 n,) from the coordinates (2, m) of a contact mode."""
-    used = used_width(tables, mode)
-    z_re, z_im = z[0, :used], z[1, :used]
-    re, im, n_whole = tables.motion_re[mode], tables.motion_im[mode], motion.size - motion.size % 4
-    for row in range(0, n_whole, 4):  # four at a time: one would wait for its sum
-        first_re, second_re, third_re, fourth_re = re[row], re[row + 1], re[row + 2], re[row + 3]
-        first_im, second_im, third_im, fourth_im = im[row], im[row + 1], im[row + 2], im[row + 3]
-        first, second, third, fourth = 0.0, 0.0, 0.0, 0.0
-        for k in range(used):
-            a, b = z_re[k], z_im[k]
-            first += first_re[k] * a - first_im[k] * b
-            second += second_re[k] * a - second_im[k] * b
-            third += third_re[k] * a - third_im[k] * b
-            fourth += fourth_re[k] * a - fourth_im[k] * b
-        motion[row], motion[row + 1], motion[row + 2], motion[row + 3] = first, second, third, fourth
-    for row in range(n_whole, motion.size):
-        motion[row] = dot(re[row], im[row], z_re, z_im)
 
 
 @jit_lean_sum

@@ -29,12 +29,12 @@ from rubhpc.kernels.coordinate_steps import floor_log2, go_on, turn_on
 from rubhpc.kernels.event_bounds import FEW_BITS, WORTH_ASKING, free_until
 from rubhpc.kernels.event_forces import FrictionWork  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.event_search import approach_change, find_change, move_stuck
-from rubhpc.kernels.event_steps import choose_step, end_samples
+from rubhpc.kernels.event_steps import choose_step, end_samples, enter_wanted
 from rubhpc.kernels.friction_change import take_change
-from rubhpc.kernels.friction_coordinates import enter_states, used_width
+from rubhpc.kernels.friction_coordinates import used_width
 from rubhpc.kernels.friction_events import observe_states
-from rubhpc.kernels.friction_measuring import observe_spans
-from rubhpc.kernels.friction_spans import LONGEST, begin_span, has_room, note_span
+from rubhpc.kernels.friction_measuring import observe_span
+from rubhpc.kernels.friction_spans import LONGEST, begin_span
 from rubhpc.kernels.friction_states import FrictionBodies, stuck_pairs
 from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.trail import note_piece
@@ -79,16 +79,14 @@ def advance_with_friction(
     power_re, power_im, n_eigenmode = tables.power_re, tables.power_im, tables.n_eigenmode
     rim_speed, overlap = bodies.rim_speed, reduced.overlap
     highest_level = power_re.shape[1] - 1
-    if is_recorded:  # spans have room for some samples
+    if is_recorded:
         highest_level = min(highest_level, clock.sample_level + floor_log2(LONGEST))
     last_step = progress.n_step + MOST_STEPS
     progress.halving_level, progress.is_after_event = NONE, 0
     is_new = True  # the contact mode, to this call
     while True:
         if progress.wanted >= 0:
-            if not enter_states(tables, reduced, clock, progress, motion, z):
-                if is_recorded:
-                    observe_spans(tables, bodies, clock, progress, recorder, samples, accumulator)
+            if not enter_wanted(tables, reduced, clock, progress, motion, z):
                 return MODE_WANTED
             note_piece(work.trail, mask[progress.mode], z)
             is_new = True
@@ -102,14 +100,12 @@ def advance_with_friction(
             if is_recorded:
                 observe_states(mask[progress.mode], accumulator)
         if is_recorded and progress.energy_from < 0:
-            begin_span(recorder.spans, z)
+            begin_span(recorder.span, z)
             progress.energy_from = progress.tick
         is_over, crossing = progress.tick >= last_tick, int(np.int64(0))
         if not is_over:
             is_at_event = progress.is_after_event == 1 or progress.halving_level >= 0
             if progress.n_step > last_step and not is_at_event:
-                if is_recorded:
-                    observe_spans(tables, bodies, clock, progress, recorder, samples, accumulator)
                 return PAUSED
             mode = progress.mode
             states = mask[mode]
@@ -191,19 +187,7 @@ def advance_with_friction(
                     move_stuck(states, n_eigenmode[mode], rim_speed, step, z_re)
             progress.tick += passed
             progress.halving_level = max(progress.halving_level - 1, NONE)
-        if is_recorded:
-            n_sample = (progress.tick >> clock.sample_level) - (progress.energy_from >> clock.sample_level)
-            if is_over or crossing != 0 or n_sample >= LONGEST:
-                if not has_room(recorder.spans, n_sample + 1):
-                    observe_spans(tables, bodies, clock, progress, recorder, samples, accumulator)
-                begin, progress.energy_from = progress.energy_from, NONE
-                note_span(recorder.spans, progress.mode, begin, progress.tick, n_sample + 1, z)
-        if is_over:
-            if is_recorded:
-                observe_spans(tables, bodies, clock, progress, recorder, samples, accumulator)
-                is_sample = progress.tick == progress.next_sample << clock.sample_level
-                end_samples(tables, clock, is_sample, z, progress, recorder, samples, accumulator)
-            return FINISHED
+        outcome = UNDER_WAY
         if crossing != 0:  # within the next tick
             outcome = take_change(
                 tables,
@@ -220,10 +204,17 @@ def advance_with_friction(
                 samples,
                 accumulator,
             )
-            if outcome != UNDER_WAY:
-                if is_recorded:
-                    observe_spans(tables, bodies, clock, progress, recorder, samples, accumulator)
-                return outcome
+        if is_recorded:
+            n_sample = (progress.tick >> clock.sample_level) - (progress.energy_from >> clock.sample_level)
+            if is_over or crossing != 0 or n_sample >= LONGEST:
+                observe_span(tables, bodies, clock, z, progress, recorder, samples, accumulator)
+        if is_over:
+            if is_recorded:
+                is_sample = progress.tick == progress.next_sample << clock.sample_level
+                end_samples(tables, clock, is_sample, z, progress, recorder, samples, accumulator)
+            return FINISHED
+        if outcome != UNDER_WAY:
+            return outcome
 
 
 @jit_inline_sum

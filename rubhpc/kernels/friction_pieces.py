@@ -16,7 +16,7 @@ from rubhpc.kernels.case_progress import (
     Clock,
     Progress,
 )
-from rubhpc.kernels.contact_modes import FORCED_LEVEL, ModeTables, Reduced, dot, is_within
+from rubhpc.kernels.contact_modes import FORCED_LEVEL, ModeTables, Reduced, dot, is_within, leave
 from rubhpc.kernels.event_forces import FrictionWork  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.friction_change import change_states
 from rubhpc.kernels.friction_loop import advance_with_friction
@@ -44,7 +44,6 @@ from rubhpc.kernels.pieces import (
     begin_piece,
     clock_of,
     end_piece,
-    read_motion,
     row_of,
     set_masks,
     start_piece,
@@ -133,7 +132,7 @@ def advance_friction_pieces(
             )
             if outcome != FINISHED:
                 return outcome
-            read_motion(tables, progress.mode, z, pieces.motion[piece + 1])
+            leave(tables, progress.mode, z, pieces.motion[piece + 1])
             if not is_within(
                 pieces.motion[piece + 1],
                 reduced.translations,

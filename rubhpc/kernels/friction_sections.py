@@ -50,7 +50,7 @@ def advance_friction_sections(
     """
     per_revolution = clock.samples_per_revolution << clock.sample_level
     is_recorded = bool(np.bool_(False))  # no literal: the loop is compiled for one type
-    motion_re, motion_im, n_revolution = tables.motion_re, tables.motion_im, sections.shape[0]
+    n_revolution = sections.shape[0]
     while progress.tick < 0:
         k = n_revolution + progress.tick // per_revolution
         outcome = advance_with_friction(
@@ -71,8 +71,6 @@ def advance_friction_sections(
         )
         if outcome != FINISHED:
             return outcome
-        if not note_section(
-            motion_re, motion_im, reduced, limit, energy_limit, progress, z, accumulator, sections[k]
-        ):
+        if not note_section(tables, reduced, limit, energy_limit, progress, z, accumulator, sections[k]):
             break
     return FINISHED

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_lean_sum
 from rubhpc.kernels.case_progress import DIVERGED, FINISHED, MODE_WANTED, Clock, Progress
-from rubhpc.kernels.contact_modes import ModeTables, Reduced, dot, is_within
+from rubhpc.kernels.contact_modes import ModeTables, Reduced, dot, is_within, leave
 from rubhpc.kernels.event_loop import advance
 from rubhpc.kernels.penalty_events import pressed_pairs
 from rubhpc.kernels.pieces import (
@@ -25,7 +25,6 @@ from rubhpc.kernels.pieces import (
     begin_piece,
     clock_of,
     end_piece,
-    read_motion,
     row_of,
     set_masks,
     start_piece,
@@ -114,7 +113,7 @@ def advance_pieces(
             )
             if outcome != FINISHED:
                 return outcome
-            read_motion(tables, progress.mode, z, pieces.motion[piece + 1])
+            leave(tables, progress.mode, z, pieces.motion[piece + 1])
             if not is_within(
                 pieces.motion[piece + 1],
                 reduced.translations,

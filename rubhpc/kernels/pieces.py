@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.accumulators import Accumulator
 from rubhpc.kernels.case_progress import LONG_AGO, NONE, Clock, Progress
-from rubhpc.kernels.contact_modes import DYING, ModeTables, Reduced, dot, enter, find_mode
+from rubhpc.kernels.contact_modes import DYING, ModeTables, Reduced, enter, find_mode
 from rubhpc.kernels.force_average import LOUD
 
 if TYPE_CHECKING:
@@ -158,13 +158,6 @@ def begin_piece(
     progress.entered, progress.energy_from, progress.contact_age = LONG_AGO, NONE, NONE
     progress.resolved_level, progress.halving_level, progress.is_after_event = 0, NONE, 0
     return True
-
-
-@jit_lean_sum
-def read_motion(tables: ModeTables, mode: int, z: Floats, motion: Floats) -> None:
-    """Fill in the reduced motion (2 n,) of coordinates (2, m)."""
-    for row in range(motion.size):
-        motion[row] = dot(tables.motion_re[mode, row], tables.motion_im[mode, row], z[0], z[1])
 
 
 @jit_inline_sum

@@ -25,7 +25,7 @@ from rubhpc.kernels.contact_modes import (
     ModeTables,
 )
 from rubhpc.kernels.cubics import turning_value
-from rubhpc.kernels.friction_spans import Spans, no_spans
+from rubhpc.kernels.friction_spans import Span, new_span
 
 Floats = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ class Recorder(NamedTuple):
     last: Floats  # (2, 3 + q), signals with extrema and their rates at the last sample; NaN before the first
     node: Floats  # (4, q), force, slip speed (N, m/s) and their rates of closed pairs at the last step
     entry: Floats  # (2,), J, forms of damping loss and unbalance work where the span began
-    spans: Spans  # those not yet measured (set-valued friction)
+    span: Span  # the one under way (set-valued friction)
 
 
 def recorder(q: int, n_probe: int = 0) -> Recorder:
@@ -50,7 +50,7 @@ def recorder(q: int, n_probe: int = 0) -> Recorder:
         last=np.full((2, 3 + q), np.nan),
         node=np.zeros((4, q)),
         entry=np.zeros(2),
-        spans=no_spans(),
+        span=new_span(0, 0),
     )
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.case_progress import FINISHED, Clock, Progress
-from rubhpc.kernels.contact_modes import ModeTables, Reduced, dot, is_within
+from rubhpc.kernels.contact_modes import ModeTables, Reduced, is_within, leave
 from rubhpc.kernels.event_loop import advance
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def advance_sections(
         As in `event_loop.advance`; FINISHED before tick 0 where the motion is beyond a limit.
     """
     per_revolution = clock.samples_per_revolution << clock.sample_level
-    motion_re, motion_im, n_revolution = tables.motion_re, tables.motion_im, sections.shape[0]
+    n_revolution = sections.shape[0]
     while progress.tick < 0:
         k = n_revolution + progress.tick // per_revolution
         outcome = advance(
@@ -72,17 +72,14 @@ def advance_sections(
         )
         if outcome != FINISHED:
             return outcome
-        if not note_section(
-            motion_re, motion_im, reduced, limit, energy_limit, progress, z, accumulator, sections[k]
-        ):
+        if not note_section(tables, reduced, limit, energy_limit, progress, z, accumulator, sections[k]):
             break
     return FINISHED
 
 
 @jit_inline_sum
 def note_section(
-    motion_re: Floats,
-    motion_im: Floats,
+    tables: ModeTables,
     reduced: Reduced,
     limit: float,
     energy_limit: float,
@@ -92,8 +89,7 @@ def note_section(
     section: Floats,
 ) -> bool:
     """Fill in the motion (2 n,) at coordinates (2, m); returns whether it is within the limits."""
-    for row in range(section.size):
-        section[row] = dot(motion_re[progress.mode, row], motion_im[progress.mode, row], z[0], z[1])
+    leave(tables, progress.mode, z, section)
     return is_within(
         section,
         reduced.translations,

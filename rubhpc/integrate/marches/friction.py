@@ -20,9 +20,8 @@ from rubhpc.kernels.case_progress import (
     ask_for,
     shaft_angle,
 )
-from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
 from rubhpc.kernels.friction_kernel import advance_friction
-from rubhpc.kernels.friction_spans import new_spans
+from rubhpc.kernels.friction_spans import new_span
 from rubhpc.kernels.pieces import NO_PIECES
 from rubhpc.kernels.trail import BROKEN
 
@@ -94,10 +93,9 @@ class FrictionMarch(StateSets):
 
     def _use(self, tables: ModeTables) -> None:
         super()._use(tables)
-        if self._recorder.spans.path.shape[1:] != self._z.shape:
-            n_row = self._recorder.value.size // SAMPLES_AT_ONCE
-            spans = new_spans(self._z.shape[1], self._clearance.size, n_row)
-            self._recorder = self._recorder._replace(spans=spans)
+        if self._recorder.span.begun.shape != self._z.shape:
+            span = new_span(self._z.shape[1], self._clearance.size)
+            self._recorder = self._recorder._replace(span=span)
 
     def _advance_sections(self, samples: Samples, accumulator: Accumulator, sections: Floats) -> int:
         if self._steps.are_under_way:  # some short steps before events are followed again
