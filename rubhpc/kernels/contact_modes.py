@@ -23,6 +23,7 @@ BOUND_LEVEL = 3  # `ModeTables.bound` holds over 2^level samples, or the longest
 FORCED_LEVEL = 6  # steps of up to 2^level ticks after an event need no bound, so that time advances
 RESOLVED = 0.02  # of a signal's size: its fourth derivative times the step to the fourth
 STILL = 1e-3  # 1/s, size of an exponent up to which a coordinate has no primitive
+LANES = 8  # coordinates are used in whole vectors
 DYING = -1.0  # pace of a mode that has decayed before the first step after an event ends
 
 
@@ -217,6 +218,24 @@ def enter_rest(
         motion[k] -= dot(motion_re[k], motion_im[k], z[0], z[1])
     add_rows(enter_re, motion, z[0])
     add_rows(enter_im, motion, z[1])
+
+
+@jit_inline_sum
+def used_width(tables: ModeTables, mode: int) -> int:
+    """How many coordinates of a contact mode are used, in whole vectors; those behind them are zero.
+
+    Beside the eigenmodes: the unbalance response and a 1, and a clearance and a displacement of each pair.
+    """
+    used = tables.n_eigenmode[mode] + 2 + tables.switch_re.shape[1]
+    return int(min((used + LANES - 1) // LANES * LANES, tables.switch_re.shape[2]))
+
+
+@jit_inline_sum
+def copy_coordinates(z: Floats, target: Floats) -> None:
+    """Copy coordinates (2, m)."""
+    for part in range(2):
+        for k in range(z.shape[1]):
+            target[part, k] = z[part, k]
 
 
 @jit_lean_sum

@@ -80,7 +80,7 @@ def take_change(
         for i in range(work.impulse.size):
             gained = accumulator.impulse[i] - work.impulse[i]
             samples.force[i, progress.tick >> clock.sample_level] += gained / interval
-            recorder.span.given[i] = gained
+            recorder.given[i] = gained
             if wanted >= 0:
                 record_touch(i, state_of(wanted, i) != OPEN, accumulator)
     note_event(work.trail, progress.tick, crossing)

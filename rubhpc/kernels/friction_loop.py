@@ -23,19 +23,19 @@ from rubhpc.kernels.case_progress import (
     UNDER_WAY,
     Clock,
     Progress,
+    Sections,
 )
-from rubhpc.kernels.contact_modes import ModeTables, Reduced  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.contact_modes import ModeTables, Reduced, used_width
 from rubhpc.kernels.coordinate_steps import floor_log2, go_on, turn_on
 from rubhpc.kernels.event_bounds import FEW_BITS, WORTH_ASKING, free_until
 from rubhpc.kernels.event_forces import FrictionWork  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.event_search import approach_change, find_change, move_stuck
-from rubhpc.kernels.event_steps import choose_step, end_samples, enter_wanted
+from rubhpc.kernels.event_steps import choose_step, end_samples, enter_wanted, note_section
 from rubhpc.kernels.friction_change import take_change
-from rubhpc.kernels.friction_coordinates import used_width
 from rubhpc.kernels.friction_events import observe_states
 from rubhpc.kernels.friction_measuring import observe_span
-from rubhpc.kernels.friction_spans import LONGEST, begin_span
 from rubhpc.kernels.friction_states import FrictionBodies, stuck_pairs
+from rubhpc.kernels.measuring import begin_span
 from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.trail import note_piece
 
@@ -43,6 +43,8 @@ if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
 
 Floats = NDArray[np.float64]
+
+LONGEST = 128  # samples after which a span is ended without an event: its forces are bounded by its beginning
 
 
 @jit_part_sum
@@ -61,6 +63,7 @@ def advance_with_friction(
     recorder: Recorder,
     samples: Samples,
     accumulator: Accumulator,
+    sections: Sections,
 ) -> int:
     """Advance a case from the tick reached to `last_tick`, as `event_loop.advance` does.
 
@@ -100,8 +103,7 @@ def advance_with_friction(
             if is_recorded:
                 observe_states(mask[progress.mode], accumulator)
         if is_recorded and progress.energy_from < 0:
-            begin_span(recorder.span, z)
-            progress.energy_from = progress.tick
+            begin_span(z, progress, recorder)
         is_over, crossing = progress.tick >= last_tick, int(np.int64(0))
         if not is_over:
             is_at_event = progress.is_after_event == 1 or progress.halving_level >= 0
@@ -212,6 +214,12 @@ def advance_with_friction(
             if is_recorded:
                 is_sample = progress.tick == progress.next_sample << clock.sample_level
                 end_samples(tables, clock, is_sample, z, progress, recorder, samples, accumulator)
+            elif note_section(tables, reduced, clock, progress, z, accumulator, sections):
+                last_tick += clock.samples_per_revolution << clock.sample_level
+                last_step = progress.n_step + MOST_STEPS
+                progress.halving_level, progress.is_after_event = NONE, 0
+                is_new = True
+                continue
             return FINISHED
         if outcome != UNDER_WAY:
             return outcome

@@ -12,17 +12,16 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, jit_part_sum
 from rubhpc.kernels.accumulators import DAMPING_LOSS, observe_force, observe_rub
-from rubhpc.kernels.case_progress import NONE, Clock, Progress
-from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE, ModeTables
+from rubhpc.kernels.case_progress import Clock, Progress  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE, ModeTables, copy_coordinates
 from rubhpc.kernels.event_search import move_ticks
 from rubhpc.kernels.force_average import AVERAGING_TIME
-from rubhpc.kernels.friction_coordinates import add_energies
-from rubhpc.kernels.friction_spans import RUBBED, copy_coordinates
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, FrictionBodies, state_of
 from rubhpc.kernels.friction_work import rub_through
+from rubhpc.kernels.measuring import end_span
 from rubhpc.kernels.peak_search import follow_force, recent_impulse
 from rubhpc.kernels.sampling import Recorder, take_samples
-from rubhpc.kernels.span_forces import begin_force, pass_force
+from rubhpc.kernels.span_forces import RUBBED, begin_force, pass_force
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
@@ -42,16 +41,15 @@ def observe_span(
     accumulator: Accumulator,
 ) -> None:
     """Measure the span from `progress.energy_from` to now, at coordinates (2, m); none is under way then."""
-    span, mode, begin, end = recorder.span, progress.mode, progress.energy_from, progress.tick
-    progress.energy_from = NONE
+    mode, begin, end, given = progress.mode, progress.energy_from, progress.tick, recorder.given
+    end_span(tables, clock, z, progress, recorder, accumulator)
     if end > begin:
-        time = (end - begin) * clock.tick
-        add_energies(tables, mode, time, span.begun, z, recorder, accumulator)
         pass_parts(tables, bodies, clock, begin, z, progress, recorder, samples, accumulator)
         add_rubs(tables, bodies, clock, mode, end - begin, z, recorder, accumulator)
-    for i in range(bodies.rim_speed.size):
-        if span.given[i] != 0.0:
-            observe_force(i, end * clock.tick, 0.0, span.given[i], 0.0, 0.0, accumulator)
+    for i in range(given.size):
+        if given[i] != 0.0:
+            observe_force(i, end * clock.tick, 0.0, given[i], 0.0, 0.0, accumulator)
+            given[i] = 0.0
 
 
 @jit_inline_sum
@@ -70,16 +68,16 @@ def pass_parts(
 
     Samples are read one by one, or ahead while no pair is closed.
     """
-    span, mode, end, level = recorder.span, progress.mode, progress.tick, clock.sample_level
+    mode, end, level = progress.mode, progress.tick, clock.sample_level
     states, interval, at_once = tables.mask[mode], clock.tick * (1 << level), 1
     if states == 0:
         at_once = min(SAMPLES_AT_ONCE, max(1, (1 << (tables.power_re.shape[1] - 1)) >> level))
-    here, spare, time = span.path[0], span.path[1], (end - begin) * clock.tick
-    copy_coordinates(span.begun, here)
+    here, spare, time = recorder.path[0], recorder.path[1], (end - begin) * clock.tick
+    copy_coordinates(recorder.begun, here)
     copy_coordinates(here, spare)
     for i in range(bodies.rim_speed.size):
         if state_of(states, i) != OPEN:
-            begin_force(tables, bodies, mode, i, time, min(time, interval), here, span.pair[i])
+            begin_force(tables, bodies, mode, i, time, min(time, interval), here, recorder.pair[i])
     now = begin
     while now < end:
         sample, following = now >> level, (now >> level) + 1
@@ -120,7 +118,7 @@ def pass_part(
     accumulator: Accumulator,
 ) -> float:
     """Add the force of closed pair i between two ticks, from `now` to `stop`, of a span; its impulse, N s."""
-    span, near = recorder.span, int(AVERAGING_TIME / clock.tick) + 1
+    near = int(AVERAGING_TIME / clock.tick) + 1
     before, after, impulse, most = pass_force(
         tables,
         bodies,
@@ -130,10 +128,10 @@ def pass_part(
         (stop - begin) * clock.tick,
         stop == end,
         there,
-        span.pair[i],
+        recorder.pair[i],
     )
     time, peak = now * clock.tick, accumulator.peak_force[i]
-    hit, hits = recent_impulse(i, time, accumulator), span.given[i] if stop == end else 0.0
+    hit, hits = recent_impulse(i, time, accumulator), recorder.given[i] if stop == end else 0.0
     is_high = most > peak
     if is_high or (hit + hits > 0.0 and most + (hit + hits) / AVERAGING_TIME > peak):
         # A mean over an impact has its impulse too: the force is followed near that.
@@ -163,9 +161,9 @@ def add_rubs(
     Of drive and friction together the damping of the tables knows the work in closed form, and counts it as
     its own: what is added to them here is taken off there.
     """
-    span, time = recorder.span, n_tick * clock.tick
+    time = n_tick * clock.tick
     for i in range(bodies.rim_speed.size):
-        state, rubbed = state_of(tables.mask[mode], i), span.pair[i, RUBBED]
+        state, rubbed = state_of(tables.mask[mode], i), recorder.pair[i, RUBBED]
         if state == OPEN:
             continue
         accumulator.contact_time[i] += time
@@ -175,7 +173,9 @@ def add_rubs(
             drive, friction_work = bodies.rim_speed[i] * rubbed, 0.0
         else:
             sense = -1.0 if state == BACKWARD else 1.0
-            work, least, most = rub_through(tables, bodies, clock, mode, i, n_tick, span.begun, z, span.path)
+            work, least, most = rub_through(
+                tables, bodies, clock, mode, i, n_tick, recorder.begun, z, recorder.path
+            )
             slip = max(least, 0.0) if state == FORWARD else -most
             accumulator.least_slip[i] = min(accumulator.least_slip[i], slip)
             friction_work = bodies.sliding[i] * work

@@ -15,6 +15,7 @@ from rubhpc.kernels.case_progress import (
     MODE_WANTED,
     Clock,
     Progress,
+    Sections,
 )
 from rubhpc.kernels.contact_modes import FORCED_LEVEL, ModeTables, Reduced, dot, is_within, leave
 from rubhpc.kernels.event_forces import FrictionWork  # noqa: TC001 - part of a kernel's signature
@@ -74,6 +75,7 @@ def advance_friction_pieces(
     recorder: Recorder,
     samples: Samples,
     sums: Accumulator,
+    sections: Sections,
 ) -> int:
     """Advance a case through pieces, as `piece_loop.advance_pieces` does.
 
@@ -129,6 +131,7 @@ def advance_friction_pieces(
                 recorder,
                 samples,
                 part,
+                sections,
             )
             if outcome != FINISHED:
                 return outcome

@@ -8,12 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, short_loops
-from rubhpc.kernels.contact_modes import ModeTables, dot
+from rubhpc.kernels.contact_modes import ModeTables, copy_coordinates, dot, used_width
 from rubhpc.kernels.coordinate_steps import turn_on
 from rubhpc.kernels.cubics import turning_value
 from rubhpc.kernels.event_search import longest_move, move_stuck
-from rubhpc.kernels.friction_coordinates import used_width
-from rubhpc.kernels.friction_spans import copy_coordinates
 from rubhpc.kernels.friction_states import FrictionBodies, stuck_pairs
 
 if TYPE_CHECKING:

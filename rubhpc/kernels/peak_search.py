@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, jit_part_sum
 from rubhpc.kernels.accumulators import observe_force
-from rubhpc.kernels.contact_modes import DYING, RESOLVED, ModeTables, dot
+from rubhpc.kernels.contact_modes import DYING, RESOLVED, ModeTables, copy_coordinates, dot
 from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.event_search import longest_move, move_ticks
 from rubhpc.kernels.force_average import AVERAGING_TIME, BEGIN, COUNT, END, IMPULSE, OLDEST
-from rubhpc.kernels.friction_spans import copy_coordinates
 from rubhpc.kernels.friction_states import STUCK, FrictionBodies, state_of
 from rubhpc.kernels.friction_work import gains
 
@@ -86,7 +85,7 @@ def follow_force(
     What an event sets off is fast at first: no piece but the first is longer than the contact mode has
     lasted. From `calm_from` to `calm_to` pieces are long.
     """
-    at, ahead = recorder.span.path[2], recorder.span.path[3]
+    at, ahead = recorder.path[2], recorder.path[3]
     copy_coordinates(z, at)
     copy_coordinates(z, ahead)
     first = int(FIRST * AVERAGING_TIME / clock.tick) + 1

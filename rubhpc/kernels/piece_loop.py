@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_lean_sum
-from rubhpc.kernels.case_progress import DIVERGED, FINISHED, MODE_WANTED, Clock, Progress
+from rubhpc.kernels.case_progress import DIVERGED, FINISHED, MODE_WANTED, Clock, Progress, Sections
 from rubhpc.kernels.contact_modes import ModeTables, Reduced, dot, is_within, leave
 from rubhpc.kernels.event_loop import advance
 from rubhpc.kernels.penalty_events import pressed_pairs
@@ -52,6 +52,7 @@ def advance_pieces(
     recorder: Recorder,
     samples: Samples,
     sums: Accumulator,
+    sections: Sections,
 ) -> int:
     """Advance a case through pieces, from `pieces.at` on, and record every sample.
 
@@ -67,6 +68,8 @@ def advance_pieces(
         Of one piece.
     sums : Accumulator
         (1 + k c, ...) each: of the time before, then of every part of the pieces, zero on entry.
+    sections : Sections
+        None.
 
     Returns
     -------
@@ -110,6 +113,7 @@ def advance_pieces(
                 recorder,
                 samples,
                 part,
+                sections,
             )
             if outcome != FINISHED:
                 return outcome

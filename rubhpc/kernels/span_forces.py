@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, short_loops
 from rubhpc.kernels.force_average import AVERAGING_TIME
-from rubhpc.kernels.friction_spans import EXCESS, PRIMITIVE, RAMP, RUBBED, STEADY, VALUE
 from rubhpc.kernels.friction_states import STUCK, FrictionBodies, state_of
 
 if TYPE_CHECKING:
@@ -21,6 +20,10 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
+# Columns of `Recorder.pair`. Of the force where a part begins: value, N, primitive, N s, steady part, N,
+# growth, N/s, and by how much its means may exceed a parabola, N. Then the integral of the friction of a pair
+# that sticks, and of the force of one that slides, N s.
+VALUE, PRIMITIVE, STEADY, RAMP, EXCESS, RUBBED = range(6)
 MISSED = float(np.sqrt(3.0)) / 216.0  # of the third derivative times the length to the third: by a parabola
 SHARED = 1.5  # by how much the mean of a parabola with the impulse of a part may exceed its own, in its terms
 

@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.complementarity import solve_active
-from rubhpc.kernels.contact_modes import ModeTables, Reduced, add_rows, dot, leave
+from rubhpc.kernels.contact_modes import ModeTables, Reduced, add_rows, copy_coordinates, dot, leave
 from rubhpc.kernels.coordinate_steps import floor_log2, turn_on
-from rubhpc.kernels.friction_spans import copy_coordinates
 from rubhpc.kernels.mode_change import AT_REST, product
 from rubhpc.kernels.trail import Trail  # noqa: TC001 - part of a kernel's signature
 

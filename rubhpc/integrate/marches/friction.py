@@ -16,12 +16,13 @@ from rubhpc.integrate.record import State
 from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
     FINISHED,
+    NO_SECTIONS,
     PAUSED,
+    Sections,
     ask_for,
     shaft_angle,
 )
 from rubhpc.kernels.friction_kernel import advance_friction
-from rubhpc.kernels.friction_spans import new_span
 from rubhpc.kernels.pieces import NO_PIECES
 from rubhpc.kernels.trail import BROKEN
 
@@ -34,13 +35,11 @@ if TYPE_CHECKING:
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
     from rubhpc.kernels.accumulators import Accumulator, Samples
-    from rubhpc.kernels.contact_modes import ModeTables
     from rubhpc.kernels.pieces import Pieces
     from rubhpc.kernels.trail import Trail
 
     Floats = NDArray[np.float64]
 
-_NO_SECTIONS = np.zeros((0, 0))
 _NO_RECORD = new_accumulator(0)
 _NO_SUMS = stacked_accumulators(0, _NO_RECORD)
 
@@ -91,22 +90,14 @@ class FrictionMarch(StateSets):
         self._friction = self._friction_bodies()
         return setup.friction_library(friction)
 
-    def _use(self, tables: ModeTables) -> None:
-        super()._use(tables)
-        if self._recorder.span.begun.shape != self._z.shape:
-            span = new_span(self._z.shape[1], self._clearance.size)
-            self._recorder = self._recorder._replace(span=span)
-
     def _advance_sections(self, samples: Samples, accumulator: Accumulator, sections: Floats) -> int:
         if self._steps.are_under_way:  # some short steps before events are followed again
-            clock = self.clock
-            per_revolution = clock.samples_per_revolution << clock.sample_level
-            k = len(sections) + int(self.progress.tick) // per_revolution
-            outcome = self._kernel((k + 1 - len(sections)) * per_revolution, samples, accumulator, False)
+            last_tick = self._end_of_revolution()
+            outcome = self._kernel(last_tick, samples, accumulator, False)
             if outcome == FINISHED:
-                sections[k] = self.motion()
+                sections[last_tick // self._per_revolution - 1] = self.motion()
             return outcome
-        outcome = self._by_kernel(samples, accumulator, sections=sections)
+        outcome = super()._advance_sections(samples, accumulator, sections)
         if outcome == CONTACT_UNSOLVED:
             self._hand_over()
             return PAUSED
@@ -123,9 +114,6 @@ class FrictionMarch(StateSets):
                 return outcome
             self._hand_over()
 
-    def _advance(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
-        return self._by_kernel(samples, accumulator, (last_tick, is_recorded))
-
     def _advance_pieces(self, pieces: Pieces, samples: Samples, sums: Accumulator) -> int:
         return self._by_kernel(samples, _NO_RECORD, pieces=pieces, sums=sums)
 
@@ -134,20 +122,17 @@ class FrictionMarch(StateSets):
         samples: Samples,
         accumulator: Accumulator,
         to: tuple[int, bool] = (0, False),
-        sections: Floats = _NO_SECTIONS,
+        sections: Sections = NO_SECTIONS,
         pieces: Pieces = NO_PIECES,
         sums: Accumulator = _NO_SUMS,
     ) -> int:
-        """Advance by the kernel: through pieces, by sections, or `to` a tick, recorded or not."""
+        """Advance by the kernel: through pieces, or `to` a tick, recorded or not, or by sections from it."""
         return advance_friction(
             self.tables,
             self.bodies,
             self._friction,
             self.clock,
             *to,
-            sections,
-            self._setup.displacement_limit,
-            self._setup.energy_limit,
             pieces,
             sums,
             self._bare_progress,
@@ -158,6 +143,7 @@ class FrictionMarch(StateSets):
             self._recorder,
             samples,
             accumulator,
+            sections,
         )
 
     def _hand_over(self) -> None:

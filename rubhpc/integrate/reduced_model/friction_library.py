@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Unpack
 from rubhpc.integrate.reduced_model.friction_mode import FrictionMode
 from rubhpc.integrate.reduced_model.mode_library import SPARE, ModeLibrary, Shared
 from rubhpc.integrate.reduced_model.touching import friction_mode_among
-from rubhpc.kernels.friction_coordinates import LANES
+from rubhpc.kernels.contact_modes import LANES
 from rubhpc.kernels.friction_states import FORWARD
 
 if TYPE_CHECKING:

@@ -14,8 +14,7 @@ from rubhpc.integrate.reduced_model.mode_tables import Spared, bytes_ahead, mode
 from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions
 from rubhpc.integrate.reduced_model.table_stack import MOST_BYTES, MOST_MODES, TableStack
 from rubhpc.integrate.reduced_model.touching import contact_mode_among, open_bodies
-from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
-from rubhpc.kernels.friction_coordinates import LANES
+from rubhpc.kernels.contact_modes import LANES, SAMPLES_AT_ONCE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
