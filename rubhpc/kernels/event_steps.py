@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
-@jit_part_sum
+@jit_inline_sum
 def enter_wanted(
     tables: ModeTables,
     reduced: Reduced,

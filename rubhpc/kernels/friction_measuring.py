@@ -101,7 +101,7 @@ def pass_parts(
         here, spare, now = there, here, stop
 
 
-@jit_part_sum
+@jit_inline_sum
 def pass_part(
     tables: ModeTables,
     bodies: FrictionBodies,

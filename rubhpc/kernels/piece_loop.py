@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_lean_sum
 from rubhpc.kernels.case_progress import DIVERGED, FINISHED, MODE_WANTED, Clock, Progress, Sections
-from rubhpc.kernels.contact_modes import ModeTables, Reduced, dot, is_within, leave
+from rubhpc.kernels.contact_modes import ModeTables, Reduced, dot
 from rubhpc.kernels.event_loop import advance
 from rubhpc.kernels.penalty_events import pressed_pairs
 from rubhpc.kernels.pieces import (
-    IN_PART,
     PART,
     PART_TO_BEGIN,
     PIECE,
@@ -24,6 +23,7 @@ from rubhpc.kernels.pieces import (
     begin_part,
     begin_piece,
     clock_of,
+    end_part,
     end_piece,
     row_of,
     set_masks,
@@ -94,10 +94,7 @@ def advance_pieces(
             place = 1 + piece * n_part + at[PART]
             part = row_of(sums, place)
             if at[STAGE] == PART_TO_BEGIN:
-                since = pieces.since[piece] if at[PART] == 0 else 0.0
-                begin_part(part, row_of(sums, place - 1), since, tables.mask[progress.mode])
-                progress.next_sample, progress.n_event = at[PART] * pieces.n_part_sample, 0
-                at[STAGE] = IN_PART
+                begin_part(pieces, progress, part, row_of(sums, place - 1), tables.mask[progress.mode])
             last_tick = ((at[PART] + 1) * pieces.n_part_sample) << clock.sample_level
             outcome = advance(
                 tables,
@@ -117,19 +114,8 @@ def advance_pieces(
             )
             if outcome != FINISHED:
                 return outcome
-            leave(tables, progress.mode, z, pieces.motion[piece + 1])
-            if not is_within(
-                pieces.motion[piece + 1],
-                reduced.translations,
-                reduced.stiffness,
-                part.highest,
-                part.lowest,
-                reduced.displacement_limit,
-                pieces.energy_limit,
-            ):
+            if not end_part(tables, reduced, pieces, progress.mode, z, part):
                 return DIVERGED
-            at[PART] += 1
-            at[STAGE] = PART_TO_BEGIN
         read_forces(tables, progress.mode, z, pieces.pressing[piece + 1])
         end_piece(pieces, piece, progress.n_step, tables.mask[progress.mode], z, samples)
     return FINISHED

@@ -179,6 +179,7 @@ class ModalMarch(March):
         tables = self.tables
         enter_with(
             int(tables.n_eigenmode[mode]),
+            self._z.shape[1],
             tables.enter_re[mode],
             tables.enter_im[mode],
             tables.enter_cosine[mode],
