@@ -305,7 +305,7 @@ class EventDrivenMarch(ContactSets):
     def _advance_sections(self, samples: Samples, accumulator: Accumulator, sections: Floats) -> int:
         """Advance as `_advance` does, revolution by revolution, up to sample 0."""
         kept = Sections(sections, self._setup.energy_limit)
-        return self._by_kernel(samples, accumulator, (self._end_of_revolution(), False), kept)
+        return self._by_kernel(samples, accumulator, (self._end_of_revolution(), False), sections=kept)
 
     @property
     def _per_revolution(self) -> int:
