@@ -187,7 +187,6 @@ class TangentMotion:
                 clock.samples_per_revolution << clock.sample_level,
                 trail,
                 modes.placed(),
-                march.transitions,
                 tangent,
             )
         self._motion = tangent.motion

@@ -5,12 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum
 from rubhpc.kernels.contact_pairs import rim_sense
 
 if TYPE_CHECKING:
     from rubhpc.kernels.contact_modes import ModeTables
+
+Floats = NDArray[np.float64]
 
 FINISHED, DIVERGED, CONTACT_UNSOLVED, MODE_WANTED, PAUSED, UNDER_WAY = range(6)  # outcomes
 MOST_STEPS = 50_000  # of one call: the caller checks for stop signals between calls
@@ -28,6 +31,16 @@ class Clock(NamedTuple):
     contact_level: int  # longest step with a pair closed while recording
     n_sample: int  # samples of the record, which ends where the next sample would be
     growth: float  # 1/s, of the unbalance force from tick 0 on; 0 at a constant speed
+
+
+class Sections(NamedTuple):
+    """Ends of revolutions before tick 0, where the motion is kept."""
+
+    motion: Floats  # (k, 2 n), the reduced motion at the end of each of the last k; filled in
+    energy_limit: float  # J, of divergence
+
+
+NO_SECTIONS = Sections(np.zeros((0, 0)), 0.0)
 
 
 class Progress(Protocol):

@@ -73,7 +73,7 @@ def begin_mode(
         note_piece(trail, tables.mask[progress.mode], z)
     if is_entered and is_recorded:
         if progress.energy_from < 0:
-            begin_span(tables, z, progress, recorder)
+            begin_span(z, progress, recorder)
         begin_contact(tables, reduced, progress.mode, z, z_next, recorder)
     return is_entered
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean, jit_lean_sum, jit_part_sum
+from rubhpc.kernels._jit import jit_inline_sum, jit_lean, jit_lean_sum, short_loops
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -23,6 +23,7 @@ BOUND_LEVEL = 3  # `ModeTables.bound` holds over 2^level samples, or the longest
 FORCED_LEVEL = 6  # steps of up to 2^level ticks after an event need no bound, so that time advances
 RESOLVED = 0.02  # of a signal's size: its fourth derivative times the step to the fourth
 STILL = 1e-3  # 1/s, size of an exponent up to which a coordinate has no primitive
+LANES = 8  # coordinates are used in whole vectors
 DYING = -1.0  # pace of a mode that has decayed before the first step after an event ends
 
 
@@ -118,6 +119,7 @@ def propagate(re: Floats, im: Floats, z_re: Floats, z_im: Floats, next_re: Float
 
 
 @jit_lean
+@short_loops
 def add_rows(rows: Floats, value: Floats, target: Floats) -> None:
     """Add the rows (n, m), times the values (n,), to the target (m,), four at a time, in order."""
     n_whole = value.size - value.size % 4
@@ -138,8 +140,10 @@ def add_rows(rows: Floats, value: Floats, target: Floats) -> None:
 
 
 @jit_lean_sum
+@short_loops
 def enter_with(
     n_eigenmode: int,
+    used: int,
     enter_re: Floats,
     enter_im: Floats,
     enter_cosine: Floats,
@@ -153,11 +157,12 @@ def enter_with(
 ) -> None:
     """Modal coordinates `z` (2, m) of a motion (2 n,) at the shaft's angle, with a mode's rows of the tables.
 
+    The first ones are `used`, the others zero (`used_width`).
     Python calls it with these rows alone: unpacking all tables would double the compilation time.
     """
     for part in range(2):
         rows = enter_re if part == 0 else enter_im
-        target = z[part]
+        target = z[part, :used]
         from_cosine, from_sine = enter_cosine[part], enter_sine[part]
         for k in range(target.size):  # arrays in one expression would take 5 s longer to compile
             target[k] = -from_cosine[k] * cosine - from_sine[k] * sine
@@ -166,18 +171,20 @@ def enter_with(
             for k in range(target.size):
                 target[k] -= source[k] * clearance[i]
         add_rows(rows, motion, target)
+        z[part, used:] = 0.0
     z[0, n_eigenmode], z[1, n_eigenmode] = cosine, sine
     for i in range(clearance.size):
         z[0, n_eigenmode + 1 + i], z[1, n_eigenmode + 1 + i] = clearance[i], 0.0
 
 
-@jit_part_sum
+@jit_inline_sum
 def enter(
     tables: ModeTables, mode: int, clearance: Floats, cosine: float, sine: float, motion: Floats, z: Floats
 ) -> None:
     """Modal coordinates `z` (2, m) in a contact mode of a motion (2 n,) at the shaft's angle."""
     enter_with(
         tables.n_eigenmode[mode],
+        used_width(tables, mode),
         tables.enter_re[mode],
         tables.enter_im[mode],
         tables.enter_cosine[mode],
@@ -189,6 +196,28 @@ def enter(
         motion,
         z,
     )
+
+
+@jit_inline_sum
+@short_loops
+def leave(tables: ModeTables, mode: int, z: Floats, motion: Floats) -> None:
+    """Reduced motion (2 n,) of the coordinates `z` (2, m) in a contact mode."""
+    used = used_width(tables, mode)
+    z_re, z_im = z[0, :used], z[1, :used]
+    re, im, n_whole = tables.motion_re[mode], tables.motion_im[mode], motion.size - motion.size % 4
+    for row in range(0, n_whole, 4):  # four at a time: one would wait for its sum
+        first_re, second_re, third_re, fourth_re = re[row], re[row + 1], re[row + 2], re[row + 3]
+        first_im, second_im, third_im, fourth_im = im[row], im[row + 1], im[row + 2], im[row + 3]
+        first, second, third, fourth = 0.0, 0.0, 0.0, 0.0
+        for k in range(used):
+            a, b = z_re[k], z_im[k]
+            first += first_re[k] * a - first_im[k] * b
+            second += second_re[k] * a - second_im[k] * b
+            third += third_re[k] * a - third_im[k] * b
+            fourth += fourth_re[k] * a - fourth_im[k] * b
+        motion[row], motion[row + 1], motion[row + 2], motion[row + 3] = first, second, third, fourth
+    for row in range(n_whole, motion.size):
+        motion[row] = dot(re[row], im[row], z_re, z_im)
 
 
 @jit_lean_sum
@@ -210,6 +239,24 @@ def enter_rest(
         motion[k] -= dot(motion_re[k], motion_im[k], z[0], z[1])
     add_rows(enter_re, motion, z[0])
     add_rows(enter_im, motion, z[1])
+
+
+@jit_inline_sum
+def used_width(tables: ModeTables, mode: int) -> int:
+    """How many coordinates of a contact mode are used, in whole vectors; those behind them are zero.
+
+    Beside the eigenmodes: the unbalance response and a 1, and a clearance and a displacement of each pair.
+    """
+    used = tables.n_eigenmode[mode] + 2 + tables.switch_re.shape[1]
+    return int(min((used + LANES - 1) // LANES * LANES, tables.switch_re.shape[2]))
+
+
+@jit_inline_sum
+def copy_coordinates(z: Floats, target: Floats) -> None:
+    """Copy coordinates (2, m)."""
+    for part in range(2):
+        for k in range(z.shape[1]):
+            target[part, k] = z[part, k]
 
 
 @jit_lean_sum

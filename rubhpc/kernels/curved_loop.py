@@ -118,7 +118,7 @@ def advance_curved(
         closed = int(mask[mode])
         if is_recorded and progress.energy_from < 0:
             if closed == 0:
-                begin_span(tables, z, progress, recorder)
+                begin_span(z, progress, recorder)
             else:
                 begin_curved_span(pairs, tables, curved, clock, z, progress, work)
         is_sample = is_recorded and progress.tick == progress.next_sample << clock.sample_level

@@ -8,11 +8,7 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.accumulators import (
     DAMPING_LOSS,
-    HORIZONTAL,
-    TWIST,
-    TWIST_ACCELERATION,
     UNBALANCE_WORK,
-    VERTICAL,
     Accumulator,
     Samples,
     observe_force,
@@ -22,9 +18,6 @@ from rubhpc.kernels.accumulators import (
 from rubhpc.kernels.case_progress import Clock, Progress, shaft_turn
 from rubhpc.kernels.contact_modes import (
     DYING,
-    LATERAL_ROW,
-    N_ROTOR_ROW,
-    TWIST_ACCELERATION_ROW,
     ModeTables,
     Reduced,
     add_rows,
@@ -43,7 +36,7 @@ from rubhpc.kernels.curved_contact import (
 )
 from rubhpc.kernels.curved_response import move_coordinates, respond
 from rubhpc.kernels.mode_change import product
-from rubhpc.kernels.sampling import Recorder, widen_extrema
+from rubhpc.kernels.sampling import Recorder, store_samples, widen_extrema
 
 Floats = NDArray[np.float64]
 # 1e-4 of 5! / 0.0029: the error of the polynomial through the nodes by a fifth derivative within a step.
@@ -290,18 +283,7 @@ def take_curved_sample(
             total += at[k] * work.state[k] + moving[k] * work.state[n + k]
             total += driven[k] * work.acceleration[k]
         value[r] = total
-    if i_sample < samples.rotor.shape[1]:
-        samples.rotor[VERTICAL, i_sample] = value[VERTICAL]
-        samples.rotor[HORIZONTAL, i_sample] = value[HORIZONTAL]
-        samples.rotor[TWIST, i_sample] = value[TWIST]
-        samples.rotor[TWIST_ACCELERATION, i_sample] = value[TWIST_ACCELERATION_ROW]
-        n_place = samples.axial.shape[0]
-        for i in range(n_place):
-            tip = N_ROTOR_ROW + 3 * i
-            samples.axial[i, i_sample] = value[tip]
-            samples.lateral[i, i_sample] = value[tip + LATERAL_ROW]
-        for i in range(samples.probe.shape[0]):
-            samples.probe[i, i_sample] = value[N_ROTOR_ROW + 3 * n_place + i]
+    store_samples(value, 0, i_sample, 1, samples.rotor, samples.axial, samples.lateral, samples.probe)
     widen_extrema(
         value, 1, interval, recorder.last, accumulator.lowest, accumulator.highest, accumulator.peak_lateral
     )

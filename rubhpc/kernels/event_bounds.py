@@ -7,19 +7,7 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, short_loops
 from rubhpc.kernels.coordinate_steps import floor_log2
-from rubhpc.kernels.earlier_spans import (
-    ASKED,
-    COMPARED,
-    ENTERED,
-    LEARNING,
-    LESS,
-    ROLE,
-    SHARE,
-    EarlierSpans,
-    is_watched,
-    known_until,
-    note_interval,
-)
+from rubhpc.kernels.friction_states import OPEN, state_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -28,7 +16,7 @@ THIRD, SIXTH = 1.0 / 3.0, 1.0 / 6.0
 STRIDE, N_STRIDE = 8.0, 4  # factors by which times are tried: this one, its square root, and so on
 FEW_BITS = 2  # of a count of ticks, behind the first
 WORTH_ASKING = 4  # of an interval free of events: its last share, in which it is bounded anew
-LESS_OF_IT = 0.125  # factor of a margin that leaves no time
+LESS = 0.585  # below 2 - sqrt(2): |x + i y| is at most x + y less this times the smaller, x and y positive
 CLOSE = 8  # share of a unit of ticks: a step is to end further than that behind a root
 FREE, SURE = range(2)  # rows of what is known of the switch functions
 
@@ -52,7 +40,6 @@ def free_until(
     shortest: int,
     longest: int,
     known: Ints,
-    earlier: EarlierSpans,
 ) -> tuple[int, int]:
     """How long no switch function (2 q, m) of a set of states can vanish unseen.
 
@@ -68,8 +55,6 @@ def free_until(
         The tick before which each of them cannot vanish, and that before which it does so once at most and
         stays negative, as they were proved last: those alone are asked anew that come before the others. In
         place.
-    earlier : EarlierSpans
-        An earlier span with which this one is compared, or which is learned from this one.
 
     Returns
     -------
@@ -79,7 +64,7 @@ def free_until(
         Tick before which one that has vanished is negative still: that is seen at the end of a step. No more
         than a little after one is expected to vanish.
     """
-    n_switch, first, role = known.shape[1], -1, earlier.now[ROLE]
+    n_switch, first = known.shape[1], -1
     for j in range(n_switch):
         if is_watched(states, j) and (first < 0 or known[SURE, j] < known[SURE, first]):
             first = j
@@ -88,13 +73,6 @@ def free_until(
         j = first + turn_of
         j = j - n_switch if j >= n_switch else j
         if known[SURE, j] < reached and is_watched(states, j):
-            if role == COMPARED and known[SURE, j] == known[FREE, j]:
-                until = known_until(earlier, j, max(known[FREE, j], now))
-                known[FREE, j] = known[SURE, j] = until
-                if until - now > max(shortest, (now - earlier.now[ENTERED]) // WORTH_ASKING):
-                    reached = min(reached, until)
-                    continue
-            earlier.now[ASKED] += 1
             re, im, turning_re, turning_im = (
                 switch_re[mode, j],
                 switch_im[mode, j],
@@ -122,25 +100,13 @@ def free_until(
                 rise += fast * max(turned, 0.0)
                 fast_bend += fast * bent
             slow_rate, slow_bend = rate - fast_rate, bend - fast_bend
-            margin = SHARE * value if role == LEARNING else 0.0
-            while True:
-                whole = (value - margin, rate, bend, slow_turn - fast_turn)
-                slow = (value - margin - gain, slow_rate, slow_bend, slow_turn)
-                free = min(positive_until(whole, slow, shortest * tick, most), most)
-                if free > 0.0 or not margin > 0.0:
-                    break
-                margin = LESS_OF_IT * margin if margin > LESS_OF_IT * SHARE * value else 0.0
-            sure = free
+            whole = (value, rate, bend, slow_turn - fast_turn)
+            slow = (value - gain, slow_rate, slow_bend, slow_turn)
+            sure = free = min(positive_until(whole, slow, shortest * tick, most), most)
             if value > 0.0:
                 sure = max(free, falling_until(slow_rate + rise, slow_bend, slow_turn, free))
             known[FREE, j] = now + int(free / tick)
             known[SURE, j] = now + int(min(sure, most) / tick)
-            if role == LEARNING:
-                margin += max(least_until(whole, free), least_until(slow, free))
-                note_interval(earlier, j, now, known[FREE, j], longest, margin)
-            elif role == COMPARED:
-                known[FREE, j] = known_until(earlier, j, known[FREE, j])
-                known[SURE, j] = max(known[FREE, j], known[SURE, j])
             reached = min(reached, known[SURE, j])
             if known[FREE, j] < reached:
                 passed = now + ticks_beyond(value, rate, bend, tick, reached - now)
@@ -153,14 +119,9 @@ def free_until(
 
 
 @jit_inline_sum
-def compared_until(states: int, now: int, longest: int, known: Ints, earlier: EarlierSpans) -> int:
-    """Tick before which no switch function can vanish by the earlier span; fills `known`, as `free_until`."""
-    reached = now + longest
-    for j in range(known.shape[1]):
-        if is_watched(states, j):
-            known[FREE, j] = known[SURE, j] = known_until(earlier, j, now)
-            reached = min(reached, known[FREE, j])
-    return int(reached)
+def is_watched(states: int, j: int) -> bool:
+    """Whether switch function j of a set of states is one: an open pair has one alone."""
+    return j % 2 == 0 or state_of(states, j // 2) != OPEN
 
 
 @jit_inline_sum
@@ -205,17 +166,11 @@ def is_positive(cubic: tuple[float, float, float, float], time: float) -> bool:
 
     It is if its coefficients in Bernstein's polynomials are.
     """
-    return least_until(cubic, time) > 0.0
-
-
-@jit_inline_sum
-def least_until(cubic: tuple[float, float, float, float], time: float) -> float:
-    """Least coefficient of a cubic in Bernstein's polynomials: a lower bound up to a time (s)."""
     value, rate, bend, turn = cubic
     third, sixth = rate * time * THIRD, bend * time * time * SIXTH
     second = value + 2.0 * third + sixth
     last = value + 3.0 * third + 3.0 * sixth - turn * time * time * time * SIXTH
-    return min(value, value + third, second, last)
+    return min(value, value + third, second, last) > 0.0
 
 
 @jit_inline_sum

@@ -16,7 +16,6 @@ from rubhpc.kernels._jit import jit_inline, jit_inline_sum, jit_lean
 from rubhpc.kernels.complementarity import UNSOLVED, solve_rows
 from rubhpc.kernels.contact_pairs import Workspace  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.coulomb_friction import ROUNDING, UNNOTICED, solve_cones
-from rubhpc.kernels.earlier_spans import EarlierSpans, no_earlier_spans
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, FrictionBodies, state_of
 from rubhpc.kernels.trail import Trail, no_trail
 
@@ -33,11 +32,9 @@ class FrictionWork(NamedTuple):
     slip: Floats  # (q,), m/s
     drawn: Floats  # (2 q,), how rates of gaps, then of slips change with the motion, `pull` times it, m/s2
     given: Floats  # (2, q), normal impulses of the event and tractions, N s
-    kick: Floats  # (n,), what they add to the velocity, m/s
     free_until: NDArray[
         np.int64
     ]  # (2, 2 q), what is known of the switch functions: `event_bounds.free_until`
-    earlier: EarlierSpans  # with which spans are compared
     impulse: Floats  # (q,), accumulated before the event, N s
     rest_speed: Floats  # (2 q,), rates of the gaps, then slips, m/s
     is_at_rest: NDArray[np.bool_]  # (2 q,)
@@ -46,17 +43,15 @@ class FrictionWork(NamedTuple):
     trail: Trail  # of the motion
 
 
-def friction_work(solver: Workspace, q: int, n: int) -> FrictionWork:
-    """Work space of the events of q pairs and n coordinates, with that of their laws, without a trail."""
+def friction_work(solver: Workspace, q: int) -> FrictionWork:
+    """Work space of the events of q pairs, with that of their laws, without a trail."""
     return FrictionWork(
         solver=solver,
         rate=np.zeros(q),
         slip=np.zeros(q),
         drawn=np.zeros(2 * q),
         given=np.zeros((2, q)),
-        kick=np.zeros(n),
         free_until=np.zeros((2, 2 * q), dtype=np.int64),
-        earlier=no_earlier_spans(),
         impulse=np.zeros(q),
         rest_speed=np.zeros(2 * q),
         is_at_rest=np.zeros(2 * q, dtype=np.bool_),

@@ -27,6 +27,7 @@ from rubhpc.kernels.case_progress import (
     UNDER_WAY,
     Clock,
     Progress,
+    Sections,
 )
 from rubhpc.kernels.contact_event import begin_mode, take_event
 from rubhpc.kernels.contact_modes import (
@@ -43,6 +44,7 @@ from rubhpc.kernels.event_steps import (
     end_record,
     longest_step,
     note_resolved,
+    note_section,
     sample_step,
 )
 from rubhpc.kernels.measuring import observe_step, resolved_contact
@@ -73,6 +75,7 @@ def advance(
     recorder: Recorder,
     samples: Samples,
     accumulator: Accumulator,
+    sections: Sections,
 ) -> int:
     """Advance a case from the tick reached to `last_tick`; sample 0 is tick 0.
 
@@ -93,6 +96,9 @@ def advance(
         `motion` (2 n,); the caller adds the mode and calls again.
     z, z_next : (2, m)
         Modal coordinates, real and imaginary, and work space.
+    sections : Sections
+        If there are any, the case goes on without a record, revolution by revolution from `last_tick` on to
+        tick 0, or to the end of one at which the motion is beyond a limit.
 
     Returns
     -------
@@ -122,6 +128,12 @@ def advance(
         if progress.tick >= last_tick:
             if is_recorded:
                 end_record(tables, clock, is_sample, z, progress, recorder, samples, accumulator)
+            elif note_section(tables, reduced, clock, progress, z, accumulator, sections):
+                last_tick += clock.samples_per_revolution << clock.sample_level
+                last_step = progress.n_step + MOST_STEPS
+                progress.halving_level, progress.is_after_event = NONE, 0
+                proved = progress.tick
+                continue
             return FINISHED
         is_at_event = progress.is_after_event == 1 or progress.halving_level >= 0
         if progress.n_step > last_step and not is_at_event:

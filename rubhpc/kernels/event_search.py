@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, short_loops
-from rubhpc.kernels.contact_modes import ModeTables, dot
+from rubhpc.kernels.contact_modes import ModeTables, dot, used_width
 from rubhpc.kernels.coordinate_steps import floor_log2, go_on
 from rubhpc.kernels.event_bounds import FREE
-from rubhpc.kernels.friction_coordinates import used_width
 from rubhpc.kernels.friction_states import OPEN, STUCK, FrictionBodies, state_of, stuck_pairs
 from rubhpc.kernels.mode_change import GAP_TOLERANCE
 

@@ -9,17 +9,18 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, jit_part_sum
 from rubhpc.kernels.accumulators import observe_force
-from rubhpc.kernels.case_progress import NONE, Clock, Progress, shaft_turn
+from rubhpc.kernels.case_progress import NONE, Clock, Progress, Sections, shaft_turn
 from rubhpc.kernels.contact_modes import (
     FORCED_LEVEL,
     SAMPLES_AT_ONCE,
     ModeTables,
     Reduced,
-    dot,
     enter,
     enter_rest,
     find_mode,
     is_beyond,
+    is_within,
+    leave,
 )
 from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.measuring import end_span
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
-@jit_part_sum
+@jit_inline_sum
 def enter_wanted(
     tables: ModeTables,
     reduced: Reduced,
@@ -180,6 +181,35 @@ def end_samples(
     return bool(is_end)
 
 
+@jit_part_sum
+def note_section(
+    tables: ModeTables,
+    reduced: Reduced,
+    clock: Clock,
+    progress: Progress,
+    z: Floats,
+    accumulator: Accumulator,
+    sections: Sections,
+) -> bool:
+    """Keep the motion at the end of a revolution, if motions are kept; returns whether another one follows.
+
+    None does after tick 0, nor where the motion is beyond the limits.
+    """
+    if sections.motion.shape[0] == 0:
+        return False
+    k = sections.motion.shape[0] - 1 + progress.tick // (clock.samples_per_revolution << clock.sample_level)
+    leave(tables, progress.mode, z, sections.motion[k])
+    return progress.tick < 0 and is_within(
+        sections.motion[k],
+        reduced.translations,
+        reduced.stiffness,
+        accumulator.highest,
+        accumulator.lowest,
+        reduced.displacement_limit,
+        sections.energy_limit,
+    )
+
+
 @jit_inline_sum
 def leave_mode(
     tables: ModeTables,
@@ -197,9 +227,7 @@ def leave_mode(
 
     Returns False where the motion diverges.
     """
-    mode = progress.mode
-    for k in range(motion.size):
-        motion[k] = dot(tables.motion_re[mode, k], tables.motion_im[mode, k], z[0], z[1])
+    leave(tables, progress.mode, z, motion)
     return end_mode(tables, reduced, clock, is_recorded, progress, z, motion, impulse, recorder, accumulator)
 
 

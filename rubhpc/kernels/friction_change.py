@@ -6,14 +6,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline, jit_inline_sum, jit_lean_sum
-from rubhpc.kernels.accumulators import PRESSING, Accumulator
+from rubhpc.kernels.accumulators import PRESSING, Accumulator, Samples
+from rubhpc.kernels.case_progress import (
+    CONTACT_UNSOLVED,
+    DIVERGED,
+    UNDER_WAY,
+    Clock,
+    Progress,
+    shaft_turn,
+)
 from rubhpc.kernels.complementarity import UNSOLVED
-from rubhpc.kernels.contact_modes import Reduced  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.contact_modes import FORCED_LEVEL, ModeTables, Reduced, is_beyond, leave
 from rubhpc.kernels.contact_pairs import Workspace  # noqa: TC001 - likewise
 from rubhpc.kernels.coulomb_friction import ROUNDING
 from rubhpc.kernels.event_forces import FrictionWork, solve_expected
+from rubhpc.kernels.event_steps import count_event, record_touch
 from rubhpc.kernels.friction_events import (
-    add_kick,
     bring_to_rest,
     collide,
     observe_event,
@@ -22,11 +30,65 @@ from rubhpc.kernels.friction_events import (
     see_pairs,
 )
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, FrictionBodies, state_of
+from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.soft_friction_events import press_pairs
+from rubhpc.kernels.trail import note_after, note_event
 
 Floats = NDArray[np.float64]
 
 LEAVING = 1e-3  # of the cone, within which friction is a tick before it is outside
+MOST_EVENTS = 65536  # in a revolution; more are left to short steps
+
+
+@jit_inline_sum
+def take_change(
+    tables: ModeTables,
+    reduced: Reduced,
+    bodies: FrictionBodies,
+    clock: Clock,
+    crossing: int,
+    is_recorded: bool,
+    progress: Progress,
+    z: Floats,
+    motion: Floats,
+    work: FrictionWork,
+    recorder: Recorder,
+    samples: Samples,
+    accumulator: Accumulator,
+) -> int:
+    """Take the event of the switch functions `crossing`: what it makes of `motion`, and the states wanted.
+
+    Returns
+    -------
+    int
+        UNDER_WAY, DIVERGED or CONTACT_UNSOLVED.
+    """
+    count_event(clock, progress)
+    leave(tables, progress.mode, z, motion)
+    if is_beyond(reduced, motion):
+        return DIVERGED
+    if is_recorded:
+        for i in range(work.impulse.size):
+            work.impulse[i] = accumulator.impulse[i]
+    cosine, sine = shaft_turn(clock, progress.tick)
+    states, moment = tables.mask[progress.mode], (1 << FORCED_LEVEL) * clock.tick
+    wanted = change_states(
+        reduced, bodies, states, crossing, moment, cosine, sine, motion, is_recorded, work, accumulator
+    )
+    if is_recorded:
+        interval = clock.tick * (1 << clock.sample_level)
+        for i in range(work.impulse.size):
+            gained = accumulator.impulse[i] - work.impulse[i]
+            samples.force[i, progress.tick >> clock.sample_level] += gained / interval
+            recorder.given[i] = gained
+            if wanted >= 0:
+                record_touch(i, state_of(wanted, i) != OPEN, accumulator)
+    note_event(work.trail, progress.tick, crossing)
+    if wanted < 0 or progress.n_event > MOST_EVENTS:
+        return CONTACT_UNSOLVED
+    note_after(work.trail, work.rate, work.slip, work.given)
+    progress.wanted = wanted
+    return UNDER_WAY
 
 
 @jit_lean_sum
@@ -52,36 +114,10 @@ def change_states(
     `_soften`.
     """
     see_pairs(reduced, bodies, states, crossing, motion, work)
-    found = change_seen(
-        reduced, bodies, states, crossing, moment, cosine, sine, motion, is_recorded, work, accumulator
-    )
-    add_kick(work, motion)
-    return found
-
-
-@jit_inline_sum
-def change_seen(
-    reduced: Reduced,
-    bodies: FrictionBodies,
-    states: int,
-    crossing: int,
-    moment: float,
-    cosine: float,
-    sine: float,
-    motion: Floats,
-    is_recorded: bool,
-    work: FrictionWork,
-    accumulator: Accumulator,
-) -> int:
-    """States that go on after an event, or -1, by what `work` sees of the pairs; fills its impulses.
-
-    As in `change_states`, but the motion is left as it is; it is read under a penalty alone.
-    """
     q, solver = work.rate.size, work.solver
     is_soft = reduced.spring > 0.0
     remaining = int(np.int64(0))
     work.given[:] = 0.0
-    work.kick[:] = 0.0
     if is_soft:
         remaining = press_pairs(reduced, states, crossing, motion, work)
         for i in range(q):
@@ -89,7 +125,7 @@ def change_seen(
                 along = rate_without_forces(bodies, q + i, cosine, sine, work)
                 solver.slip[i] = work.slip[i] / moment + along
     else:
-        if not collide(reduced, bodies, states, crossing, is_recorded, work, accumulator):
+        if not collide(reduced, bodies, states, crossing, motion, is_recorded, work, accumulator):
             return -1
         part_pairs(reduced, bodies, moment, cosine, sine, work)
     pivots = solve_expected(bodies, states, crossing, work, False)
@@ -104,7 +140,7 @@ def change_seen(
         elif is_recorded and reduced.restitution > 0.0:
             has_bounced = state_of(states, i) == OPEN and (crossing >> (2 * i)) & 1 == 1
             accumulator.n_contact[i] += 1 if has_bounced else 0
-    bring_to_rest(reduced, bodies, remaining, is_recorded, work, accumulator)
+    bring_to_rest(reduced, bodies, remaining, motion, is_recorded, work, accumulator)
     return remaining
 
 

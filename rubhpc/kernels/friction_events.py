@@ -66,36 +66,16 @@ def see_pairs(
 
 
 @jit_inline_sum
-def give_impulses(reduced: Reduced, work: FrictionWork) -> None:
-    """Add the impulses that `work.solver` holds to those of the event."""
-    solver = work.solver
+def give_impulses(reduced: Reduced, motion: Floats, work: FrictionWork) -> None:
+    """Add the impulses that `work.solver` holds to the motion (2 n,), and to those of the event."""
+    solver, velocity = work.solver, motion[motion.size // 2 :]
     for i in range(work.rate.size):
         force, traction = solver.force[i], solver.traction[i]
         if force != 0.0 or traction != 0.0:
             work.given[0, i] += force
             work.given[1, i] += traction
-            for k in range(work.kick.size):
-                work.kick[k] += force * reduced.gap_jacobian[i, k] - traction * reduced.slip[i, k]
-
-
-@jit_inline_sum
-def see_impulses(bodies: FrictionBodies, states: int, crossing: int, work: FrictionWork) -> None:
-    """Bring what is seen of the pairs up to the first impulses of an event."""
-    solver, q, n = work.solver, work.rate.size, work.kick.size
-    for i in range(q):
-        if takes_part(states, crossing, i):
-            work.rate[i] += gap_change(solver, i)
-            work.slip[i] += slip_change(solver, i)
-            work.drawn[i] += product(bodies.pull[i, n:], work.kick)
-            work.drawn[q + i] += product(bodies.pull[q + i, n:], work.kick)
-
-
-@jit_inline_sum
-def add_kick(work: FrictionWork, motion: Floats) -> None:
-    """Add to a motion (2 n,) what the impulses of an event do to its velocity."""
-    n = work.kick.size
-    for k in range(n):
-        motion[n + k] += work.kick[k]
+            for k in range(velocity.size):
+                velocity[k] += force * reduced.gap_jacobian[i, k] - traction * reduced.slip[i, k]
 
 
 @jit_inline_sum
@@ -104,6 +84,7 @@ def collide(
     bodies: FrictionBodies,
     states: int,
     crossing: int,
+    motion: Floats,
     is_recorded: bool,
     work: FrictionWork,
     accumulator: Accumulator,
@@ -139,8 +120,8 @@ def collide(
     if is_recorded:
         observe_event(IMPACT, pivots, solver, accumulator)
         observe_impacts(bodies, work, accumulator)
-    give_impulses(reduced, work)
-    see_impulses(bodies, states, crossing, work)
+    give_impulses(reduced, motion, work)
+    see_pairs(reduced, bodies, states, crossing, motion, work)
     for i in range(work.rate.size):
         if solver.force[i] > 0.0:
             bound = solver.cone[i] * solver.force[i] * (1.0 - ROUNDING)
@@ -185,6 +166,7 @@ def bring_to_rest(
     reduced: Reduced,
     bodies: FrictionBodies,
     states: int,
+    motion: Floats,
     is_recorded: bool,
     work: FrictionWork,
     accumulator: Accumulator,
@@ -209,7 +191,7 @@ def bring_to_rest(
         return
     if is_recorded:
         observe_impacts(bodies, work, accumulator)
-    give_impulses(reduced, work)
+    give_impulses(reduced, motion, work)
     for i in range(q):
         work.rate[i] += gap_change(work.solver, i)
         work.slip[i] += slip_change(work.solver, i)

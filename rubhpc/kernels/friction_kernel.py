@@ -1,6 +1,6 @@
 """The kernel of set-valued friction that Python calls.
 
-A case advances in three ways that share the loop from event to event. The loop is most of what there is to
+A case advances in two ways that share the loop from event to event. The loop is most of what there is to
 compile (90 s): in one kernel it is compiled once.
 """
 
@@ -14,17 +14,15 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import jit_lean_sum
 from rubhpc.kernels.friction_loop import advance_with_friction
 from rubhpc.kernels.friction_pieces import advance_friction_pieces
-from rubhpc.kernels.friction_sections import advance_friction_sections
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
-    from rubhpc.kernels.case_progress import Clock, Progress
+    from rubhpc.kernels.case_progress import Clock, Progress, Sections
     from rubhpc.kernels.contact_modes import ModeTables, Reduced
     from rubhpc.kernels.event_forces import FrictionWork
     from rubhpc.kernels.friction_states import FrictionBodies
     from rubhpc.kernels.pieces import Pieces
     from rubhpc.kernels.sampling import Recorder
-    from rubhpc.kernels.transitions import Transitions
 
 Floats = NDArray[np.float64]
 
@@ -37,9 +35,6 @@ def advance_friction(
     clock: Clock,
     last_tick: int,
     is_recorded: bool,
-    sections: Floats,
-    limit: float,
-    energy_limit: float,
     pieces: Pieces,
     sums: Accumulator,
     progress: Progress,
@@ -50,16 +45,14 @@ def advance_friction(
     recorder: Recorder,
     samples: Samples,
     accumulator: Accumulator,
-    transitions: Transitions,
+    sections: Sections,
 ) -> int:
-    """Advance a case through `pieces` if there are any, by `sections` if there are any, else to `last_tick`.
+    """Advance a case through `pieces` if there are any, else to `last_tick` or by `sections`.
 
     Parameters
     ----------
-    last_tick : int, is_recorded : bool
+    last_tick : int, is_recorded : bool, sections : Sections
         Of `friction_loop.advance_with_friction`.
-    sections : (n_revolution, 2 n), limit : m, energy_limit : J
-        Of `friction_sections.advance_friction_sections`; without sections, n_revolution is 0.
     pieces : Pieces, sums : Accumulator
         Of `friction_pieces.advance_friction_pieces`; without pieces, `NO_PIECES` and no rows.
 
@@ -71,14 +64,9 @@ def advance_friction(
     if pieces.spin.size > 0:
         return advance_friction_pieces(
             tables, reduced, bodies, clock, pieces, progress, z, z_next, motion, work, recorder, samples,
-            sums, transitions,
-        )  # fmt: skip
-    if sections.shape[0] > 0:
-        return advance_friction_sections(
-            tables, reduced, bodies, clock, limit, energy_limit, progress, z, z_next, motion, work, recorder,
-            samples, accumulator, sections, transitions,
+            sums, sections,
         )  # fmt: skip
     return advance_with_friction(
         tables, reduced, bodies, clock, last_tick, is_recorded, progress, z, z_next, motion, work, recorder,
-        samples, accumulator, transitions,
+        samples, accumulator, sections,
     )  # fmt: skip

@@ -23,28 +23,28 @@ from rubhpc.kernels.case_progress import (
     UNDER_WAY,
     Clock,
     Progress,
+    Sections,
 )
-from rubhpc.kernels.contact_modes import FORCED_LEVEL, ModeTables, Reduced
+from rubhpc.kernels.contact_modes import ModeTables, Reduced, used_width
 from rubhpc.kernels.coordinate_steps import floor_log2, go_on, turn_on
-from rubhpc.kernels.earlier_spans import begin_bounds, end_bounds, go_on_without
-from rubhpc.kernels.event_bounds import FEW_BITS, WORTH_ASKING, compared_until, free_until
+from rubhpc.kernels.event_bounds import FEW_BITS, WORTH_ASKING, free_until
 from rubhpc.kernels.event_forces import FrictionWork  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.event_search import approach_change, find_change, move_stuck
-from rubhpc.kernels.event_steps import choose_step, end_samples
-from rubhpc.kernels.friction_coordinates import enter_states, used_width
+from rubhpc.kernels.event_steps import choose_step, end_samples, enter_wanted, note_section
+from rubhpc.kernels.friction_change import take_change
 from rubhpc.kernels.friction_events import observe_states
-from rubhpc.kernels.friction_measuring import observe_spans
-from rubhpc.kernels.friction_passage import take_change
-from rubhpc.kernels.friction_spans import LONGEST, begin_span, has_room, note_span
+from rubhpc.kernels.friction_measuring import observe_span
 from rubhpc.kernels.friction_states import FrictionBodies, stuck_pairs
+from rubhpc.kernels.measuring import begin_span
 from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.trail import note_piece
-from rubhpc.kernels.transitions import Transitions  # noqa: TC001 - likewise
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
 
 Floats = NDArray[np.float64]
+
+LONGEST = 128  # samples after which a span is ended without an event: its forces are bounded by its beginning
 
 
 @jit_part_sum
@@ -63,7 +63,7 @@ def advance_with_friction(
     recorder: Recorder,
     samples: Samples,
     accumulator: Accumulator,
-    transitions: Transitions,
+    sections: Sections,
 ) -> int:
     """Advance a case from the tick reached to `last_tick`, as `event_loop.advance` does.
 
@@ -72,82 +72,42 @@ def advance_with_friction(
     Returns
     -------
     int
-        FINISHED, DIVERGED (at an event), MODE_WANTED (a transition may be wanted from the mode where it
-        stands), PAUSED, or CONTACT_UNSOLVED with the motion in `motion`: no forces obey the laws, or events
-        follow one another without end.
+        FINISHED, DIVERGED (at an event), MODE_WANTED, PAUSED, or CONTACT_UNSOLVED with the motion in
+        `motion`: no forces obey the laws, or events follow one another without end.
     """
     # Tuples are opened here: a field read inside the loop would count a reference at every step.
     mask, switch_re, switch_im = tables.mask, tables.switch_re, tables.switch_im
     rate_re, rate_im = tables.rate_re, tables.rate_im
     bend_re, bend_im, turn = tables.bend_re, tables.bend_im, tables.turn
     power_re, power_im, n_eigenmode = tables.power_re, tables.power_im, tables.n_eigenmode
-    pace, rim_speed = tables.pace, bodies.rim_speed
-    overlap = reduced.overlap
+    rim_speed, overlap = bodies.rim_speed, reduced.overlap
     highest_level = power_re.shape[1] - 1
-    if is_recorded:  # spans have room for some samples
+    if is_recorded:
         highest_level = min(highest_level, clock.sample_level + floor_log2(LONGEST))
     last_step = progress.n_step + MOST_STEPS
     progress.halving_level, progress.is_after_event = NONE, 0
     is_new = True  # the contact mode, to this call
-    earlier = work.earlier
-    go_on_without(earlier)
     while True:
         if progress.wanted >= 0:
-            if not enter_states(tables, reduced, clock, progress, motion, z):
-                if is_recorded:
-                    observe_spans(
-                        tables, bodies, clock, progress, recorder, samples, accumulator, transitions
-                    )
+            if not enter_wanted(tables, reduced, clock, progress, motion, z):
                 return MODE_WANTED
             note_piece(work.trail, mask[progress.mode], z)
             is_new = True
         if is_new:
             is_new = False
-            free_to = sure_to = renewed_at = (
-                progress.tick
-            )  # until when none can be, or pass unseen; is asked anew
+            # Ticks until when no event can be, until when none passes unseen, and when both are asked anew.
+            free_to = sure_to = renewed_at = progress.tick
             work.free_until[:] = progress.tick
             used = used_width(tables, progress.mode)
             z_re, z_im, next_re, next_im = z[0, :used], z[1, :used], z_next[0, :used], z_next[1, :used]
             if is_recorded:
                 observe_states(mask[progress.mode], accumulator)
-            if begin_bounds(
-                earlier,
-                mask[progress.mode],
-                progress.mode,
-                switch_re,
-                switch_im,
-                rate_re,
-                rate_im,
-                pace,
-                power_re,
-                power_im,
-                z_re,
-                z_im,
-                progress.tick,
-                clock.tick,
-            ):
-                free_to = sure_to = compared_until(
-                    mask[progress.mode],
-                    progress.tick + (1 << FORCED_LEVEL),
-                    1 << highest_level,
-                    work.free_until,
-                    earlier,
-                )
-                renewed_at = sure_to - (sure_to - progress.tick) // WORTH_ASKING
-                if sure_to > progress.tick + (2 << FORCED_LEVEL):
-                    progress.is_after_event = 0  # no step without a bound is needed
         if is_recorded and progress.energy_from < 0:
-            begin_span(recorder.spans, z)
-            progress.energy_from = progress.tick
+            begin_span(z, progress, recorder)
         is_over, crossing = progress.tick >= last_tick, int(np.int64(0))
         if not is_over:
             is_at_event = progress.is_after_event == 1 or progress.halving_level >= 0
             if progress.n_step > last_step and not is_at_event:
-                if is_recorded:
-                    observe_spans(
-                        tables, bodies, clock, progress, recorder, samples, accumulator, transitions
-                    )
                 return PAUSED
             mode = progress.mode
             states = mask[mode]
@@ -172,7 +132,6 @@ def advance_with_friction(
                     1 << clock.search_level,
                     1 << highest_level,
                     work.free_until,
-                    earlier,
                 )
                 renewed_at = sure_to - (sure_to - progress.tick) // WORTH_ASKING
             is_forced = progress.is_after_event == 1
@@ -230,23 +189,8 @@ def advance_with_friction(
                     move_stuck(states, n_eigenmode[mode], rim_speed, step, z_re)
             progress.tick += passed
             progress.halving_level = max(progress.halving_level - 1, NONE)
-        if is_recorded:
-            n_sample = (progress.tick >> clock.sample_level) - (progress.energy_from >> clock.sample_level)
-            if is_over or crossing != 0 or n_sample >= LONGEST:
-                if not has_room(recorder.spans, n_sample + 1):
-                    observe_spans(
-                        tables, bodies, clock, progress, recorder, samples, accumulator, transitions
-                    )
-                begin, progress.energy_from = progress.energy_from, NONE
-                note_span(recorder.spans, progress.mode, begin, progress.tick, n_sample + 1, z)
-        if is_over:
-            if is_recorded:
-                observe_spans(tables, bodies, clock, progress, recorder, samples, accumulator, transitions)
-                is_sample = progress.tick == progress.next_sample << clock.sample_level
-                end_samples(tables, clock, is_sample, z, progress, recorder, samples, accumulator)
-            return FINISHED
+        outcome = UNDER_WAY
         if crossing != 0:  # within the next tick
-            end_bounds(earlier, mask[progress.mode], progress.tick)
             outcome = take_change(
                 tables,
                 reduced,
@@ -256,23 +200,29 @@ def advance_with_friction(
                 is_recorded,
                 progress,
                 z,
-                z_next,
                 motion,
                 work,
                 recorder,
                 samples,
                 accumulator,
-                transitions,
             )
-            if outcome != UNDER_WAY:
-                if is_recorded:
-                    observe_spans(
-                        tables, bodies, clock, progress, recorder, samples, accumulator, transitions
-                    )
-                return outcome
-            if progress.wanted < 0:
-                note_piece(work.trail, mask[progress.mode], z)
+        if is_recorded:
+            n_sample = (progress.tick >> clock.sample_level) - (progress.energy_from >> clock.sample_level)
+            if is_over or crossing != 0 or n_sample >= LONGEST:
+                observe_span(tables, bodies, clock, z, progress, recorder, samples, accumulator)
+        if is_over:
+            if is_recorded:
+                is_sample = progress.tick == progress.next_sample << clock.sample_level
+                end_samples(tables, clock, is_sample, z, progress, recorder, samples, accumulator)
+            elif note_section(tables, reduced, clock, progress, z, accumulator, sections):
+                last_tick += clock.samples_per_revolution << clock.sample_level
+                last_step = progress.n_step + MOST_STEPS
+                progress.halving_level, progress.is_after_event = NONE, 0
                 is_new = True
+                continue
+            return FINISHED
+        if outcome != UNDER_WAY:
+            return outcome
 
 
 @jit_inline_sum

@@ -1,6 +1,6 @@
-"""What is measured of spans between events under set-valued friction, contact mode by contact mode.
+"""What is measured of a span between events under set-valued friction.
 
-A span is one linear piece of a motion, so that nothing is measured step by step.
+It is one linear piece of a motion, so that nothing is measured step by step.
 """
 
 from __future__ import annotations
@@ -11,27 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, jit_part_sum
-from rubhpc.kernels.accumulators import observe_force
+from rubhpc.kernels.accumulators import DAMPING_LOSS, observe_force, observe_rub
 from rubhpc.kernels.case_progress import Clock, Progress  # noqa: TC001 - part of a kernel's signature
-from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE, ModeTables
+from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE, ModeTables, copy_coordinates
 from rubhpc.kernels.event_search import move_ticks
 from rubhpc.kernels.force_average import AVERAGING_TIME
-from rubhpc.kernels.friction_coordinates import used_width
-from rubhpc.kernels.friction_spans import (
-    AFTER,
-    BEFORE,
-    IMPULSE,
-    MOST,
-    copy_coordinates,
-    forget_spans,
-)
-from rubhpc.kernels.friction_states import OPEN, FrictionBodies, state_of
+from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, FrictionBodies, state_of
+from rubhpc.kernels.friction_work import rub_through
+from rubhpc.kernels.measuring import end_span
 from rubhpc.kernels.peak_search import follow_force, recent_impulse
-from rubhpc.kernels.sampling import Recorder, read_samples, widen_extrema
-from rubhpc.kernels.span_energies import add_losses, add_rubs
-from rubhpc.kernels.span_forces import begin_force, pass_force
-from rubhpc.kernels.span_samples import read_noted
-from rubhpc.kernels.transitions import Transitions  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.sampling import Recorder, take_samples
+from rubhpc.kernels.span_forces import RUBBED, begin_force, pass_force
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
@@ -40,187 +30,156 @@ Floats = NDArray[np.float64]
 
 
 @jit_part_sum
-def observe_spans(
+def observe_span(
     tables: ModeTables,
     bodies: FrictionBodies,
     clock: Clock,
+    z: Floats,
     progress: Progress,
     recorder: Recorder,
     samples: Samples,
     accumulator: Accumulator,
-    transitions: Transitions,
 ) -> None:
-    """Measure the spans that are kept: samples, energies, forces and friction, and make room for others."""
-    spans, near = recorder.spans, int(AVERAGING_TIME / clock.tick) + 1
-    n_span, level, n_part, first_sample = spans.noted[0], clock.sample_level, 0, progress.next_sample
-    for s in range(n_span):
-        spans.first[s] = n_part
-        begin, end = spans.tick[s, 0], spans.tick[s, 1]
-        n_part += ((end - 1) >> level) - (begin >> level) + 1 if end > begin else 0
-    spans.first[n_span] = n_part
-    for first in range(n_span):
-        mode, n_alike = spans.mode[first], 0
-        if mode < 0:
-            continue
-        for s in range(first, n_span):
-            if spans.mode[s] == mode:
-                spans.alike[n_alike] = s
-                n_alike += 1
-                spans.mode[s] = -1 - mode
-        add_losses(tables, clock, mode, n_alike, recorder, accumulator, transitions)
-        observe_parts(
-            tables, bodies, clock, mode, n_alike, first_sample, recorder, samples, accumulator, transitions
-        )
-        add_rubs(tables, bodies, clock, mode, n_alike, spans, accumulator, transitions)
-    if n_span > 0:
-        last = spans.tick[n_span - 1, 1]
-        progress.next_sample = max(first_sample, ((last - 1) >> level) + 1)
-    watch_samples(clock, progress.next_sample - first_sample, recorder, accumulator)
-    for s in range(n_span):
-        mode = -1 - spans.mode[s]
-        now, end, states = spans.tick[s, 0], spans.tick[s, 1], tables.mask[mode]
-        for part in range(spans.first[s], spans.first[s + 1]):
-            stop = min(end, ((now >> level) + 1) << level)
-            for i in range(bodies.rim_speed.size):
-                if state_of(states, i) == OPEN:
-                    continue
-                force, begin, time = spans.force[part, i], now * clock.tick, (stop - now) * clock.tick
-                peak, hit = accumulator.peak_force[i], recent_impulse(i, begin, accumulator)
-                hits = spans.given[s, i] if stop == end else 0.0
-                is_high = force[MOST] > peak
-                if is_high or (hit + hits > 0.0 and force[MOST] + (hit + hits) / AVERAGING_TIME > peak):
-                    # A mean over an impact has its impulse too: the force is followed near that.
-                    calm_from = stop if is_high else now + near * (hit > 0.0)
-                    calm_to = stop - near * (hits > 0.0)
-                    follow_force(
-                        tables,
-                        bodies,
-                        clock,
-                        mode,
-                        s,
-                        i,
-                        now,
-                        stop,
-                        calm_from,
-                        calm_to,
-                        recorder,
-                        accumulator,
-                    )
-                else:
-                    observe_force(i, begin, time, force[IMPULSE], force[BEFORE], force[AFTER], accumulator)
-            now = stop
+    """Measure the span from `progress.energy_from` to now, at coordinates (2, m); none is under way then."""
+    mode, begin, end, given = progress.mode, progress.energy_from, progress.tick, recorder.given
+    end_span(tables, clock, z, progress, recorder, accumulator)
+    if end > begin:
+        pass_parts(tables, bodies, clock, begin, z, progress, recorder, samples, accumulator)
+        add_rubs(tables, bodies, clock, mode, end - begin, z, recorder, accumulator)
+    for i in range(given.size):
+        if given[i] != 0.0:
+            observe_force(i, end * clock.tick, 0.0, given[i], 0.0, 0.0, accumulator)
+            given[i] = 0.0
+
+
+@jit_inline_sum
+def pass_parts(
+    tables: ModeTables,
+    bodies: FrictionBodies,
+    clock: Clock,
+    begin: int,
+    z: Floats,
+    progress: Progress,
+    recorder: Recorder,
+    samples: Samples,
+    accumulator: Accumulator,
+) -> None:
+    """Read the samples of the span, and the forces in the parts between them.
+
+    Samples are read one by one, or ahead while no pair is closed.
+    """
+    mode, end, level = progress.mode, progress.tick, clock.sample_level
+    states, interval, at_once = tables.mask[mode], clock.tick * (1 << level), 1
+    if states == 0:
+        at_once = min(SAMPLES_AT_ONCE, max(1, (1 << (tables.power_re.shape[1] - 1)) >> level))
+    here, spare, time = recorder.path[0], recorder.path[1], (end - begin) * clock.tick
+    copy_coordinates(recorder.begun, here)
+    copy_coordinates(here, spare)
+    for i in range(bodies.rim_speed.size):
+        if state_of(states, i) != OPEN:
+            begin_force(tables, bodies, mode, i, time, min(time, interval), here, recorder.pair[i])
+    now = begin
+    while now < end:
+        sample, following = now >> level, (now >> level) + 1
+        if now == sample << level and sample >= progress.next_sample:
+            count = min(at_once, ((end - 1) >> level) + 1 - sample)
+            take_samples(
+                tables, mode, here[0], here[1], sample, count, interval, recorder, samples, accumulator
+            )
+            following = progress.next_sample = sample + count
+        stop, there = min(end, following << level), z
+        if stop < end:
+            there = spare
+            move_ticks(tables, bodies, mode, stop - now, clock.tick, here, there)
         for i in range(bodies.rim_speed.size):
-            if spans.given[s, i] != 0.0:
-                observe_force(i, end * clock.tick, 0.0, spans.given[s, i], 0.0, 0.0, accumulator)
-    forget_spans(spans)
+            if state_of(states, i) != OPEN:
+                impulse = pass_part(
+                    tables, bodies, clock, mode, i, begin, now, stop, end, here, there, recorder, accumulator
+                )
+                samples.force[i, sample] += impulse / interval
+                accumulator.impulse[i] += impulse
+        here, spare, now = there, here, stop
 
 
 @jit_inline_sum
-def watch_samples(clock: Clock, n_sample: int, recorder: Recorder, accumulator: Accumulator) -> None:
-    """Widen the extrema by the samples of the spans."""
-    n_row, interval = recorder.value.size // SAMPLES_AT_ONCE, clock.tick * (1 << clock.sample_level)
-    for first in range(0, n_sample, SAMPLES_AT_ONCE):
-        widen_extrema(
-            recorder.spans.value[first * n_row : (first + SAMPLES_AT_ONCE) * n_row],
-            min(SAMPLES_AT_ONCE, n_sample - first),
-            interval,
-            recorder.last,
-            accumulator.lowest,
-            accumulator.highest,
-            accumulator.peak_lateral,
-        )
-
-
-@jit_inline_sum
-def observe_parts(
+def pass_part(
     tables: ModeTables,
     bodies: FrictionBodies,
     clock: Clock,
     mode: int,
-    n_alike: int,
-    first_sample: int,
+    i: int,
+    begin: int,
+    now: int,
+    stop: int,
+    end: int,
+    here: Floats,
+    there: Floats,
     recorder: Recorder,
-    samples: Samples,
     accumulator: Accumulator,
-    transitions: Transitions,
-) -> None:
-    """Read the samples of the spans `alike` in a contact mode, and the forces in the parts between them.
-
-    `first_sample` is the first one of all spans. Outputs that are tabulated by rows are read for several
-    samples at once, others one by one, or ahead while no pair is closed.
-    """
-    spans, level, is_tabulated = recorder.spans, clock.sample_level, False
-    if transitions.mode.size > 0:
-        is_tabulated = transitions.output[mode] >= 0
-    states, n_row = tables.mask[mode], recorder.value.size // SAMPLES_AT_ONCE
-    used, interval, n_noted = used_width(tables, mode), clock.tick * (1 << level), 0
-    at_once = 1
-    if states == 0 and not is_tabulated:
-        at_once = min(SAMPLES_AT_ONCE, max(1, (1 << (tables.power_re.shape[1] - 1)) >> level))
-    for place in range(n_alike):
-        s = spans.alike[place]
-        begin, end = spans.tick[s, 0], spans.tick[s, 1]
-        time = (end - begin) * clock.tick
-        here, spare = spans.path[0], spans.path[1]
-        copy_coordinates(spans.begun[s], here)
-        if not is_tabulated:
-            copy_coordinates(here, spare)
-        for i in range(bodies.rim_speed.size):
-            if state_of(states, i) != OPEN:
-                begin_force(tables, bodies, mode, i, time, min(time, interval), here, spans.pair[s, i])
-        now, part = begin, spans.first[s]
-        while now < end:
-            following = (now >> level) + 1
-            if now == (now >> level) << level and now >> level >= first_sample:
-                sample = now >> level
-                if is_tabulated:
-                    if n_noted == SAMPLES_AT_ONCE:
-                        read_noted(transitions, mode, n_noted, used, n_row, first_sample, spans, samples)
-                        n_noted = 0
-                    spans.sample[n_noted] = sample
-                    copy_used(used, here, spans.point[n_noted])
-                    n_noted += 1
-                else:
-                    count = min(at_once, ((end - 1) >> level) + 1 - sample)
-                    read_samples(
-                        tables.output,
-                        mode,
-                        here[0],
-                        here[1],
-                        sample,
-                        count,
-                        recorder.value,
-                        samples.rotor,
-                        samples.axial,
-                        samples.lateral,
-                        samples.probe,
-                    )
-                    at, following = (sample - first_sample) * n_row, sample + count
-                    for k in range(count * n_row):
-                        spans.value[at + k] = recorder.value[k]
-            stop = min(end, following << level)
-            there = spare
-            if stop == end:
-                there = spans.ended[s]
-            else:
-                move_ticks(tables, bodies, mode, stop - now, clock.tick, here, spare)
-            if states != 0:
-                since, until = (now - begin) * clock.tick, (stop - begin) * clock.tick
-                for i in range(bodies.rim_speed.size):
-                    if state_of(states, i) == OPEN:
-                        continue
-                    pair, force, is_last = spans.pair[s, i], spans.force[part, i], stop == end
-                    pass_force(tables, bodies, mode, i, since, until, is_last, there, pair, force)
-                    samples.force[i, now >> level] += force[IMPULSE] / interval
-                    accumulator.impulse[i] += force[IMPULSE]
-            here, spare, now, part = there, here, stop, part + 1
-    if n_noted > 0:
-        read_noted(transitions, mode, n_noted, used, n_row, first_sample, spans, samples)
+) -> float:
+    """Add the force of closed pair i between two ticks, from `now` to `stop`, of a span; its impulse, N s."""
+    near = int(AVERAGING_TIME / clock.tick) + 1
+    before, after, impulse, most = pass_force(
+        tables,
+        bodies,
+        mode,
+        i,
+        (now - begin) * clock.tick,
+        (stop - begin) * clock.tick,
+        stop == end,
+        there,
+        recorder.pair[i],
+    )
+    time, peak = now * clock.tick, accumulator.peak_force[i]
+    hit, hits = recent_impulse(i, time, accumulator), recorder.given[i] if stop == end else 0.0
+    is_high = most > peak
+    if is_high or (hit + hits > 0.0 and most + (hit + hits) / AVERAGING_TIME > peak):
+        # A mean over an impact has its impulse too: the force is followed near that.
+        calm_from = stop if is_high else now + near * (hit > 0.0)
+        calm_to = stop - near * (hits > 0.0)
+        follow_force(
+            tables, bodies, clock, mode, i, begin, now, stop, calm_from, calm_to, here, recorder, accumulator
+        )
+    else:
+        observe_force(i, time, (stop - now) * clock.tick, impulse, before, after, accumulator)
+    return impulse
 
 
 @jit_inline_sum
-def copy_used(used: int, z: Floats, target: Floats) -> None:
-    """Copy the coordinates (2, m) that are used."""
-    for part in range(2):
-        for k in range(used):
-            target[part, k] = z[part, k]
+def add_rubs(
+    tables: ModeTables,
+    bodies: FrictionBodies,
+    clock: Clock,
+    mode: int,
+    n_tick: int,
+    z: Floats,
+    recorder: Recorder,
+    accumulator: Accumulator,
+) -> None:
+    """Add times of contact, slips and works of friction in the span of `n_tick` ticks that ends with `z`.
+
+    Of drive and friction together the damping of the tables knows the work in closed form, and counts it as
+    its own: what is added to them here is taken off there.
+    """
+    time = n_tick * clock.tick
+    for i in range(bodies.rim_speed.size):
+        state, rubbed = state_of(tables.mask[mode], i), recorder.pair[i, RUBBED]
+        if state == OPEN:
+            continue
+        accumulator.contact_time[i] += time
+        if state == STUCK:
+            accumulator.stick_time[i] += time
+            accumulator.least_slip[i] = min(accumulator.least_slip[i], 0.0)
+            drive, friction_work = bodies.rim_speed[i] * rubbed, 0.0
+        else:
+            sense = -1.0 if state == BACKWARD else 1.0
+            work, least, most = rub_through(
+                tables, bodies, clock, mode, i, n_tick, recorder.begun, z, recorder.path
+            )
+            slip = max(least, 0.0) if state == FORWARD else -most
+            accumulator.least_slip[i] = min(accumulator.least_slip[i], slip)
+            friction_work = bodies.sliding[i] * work
+            drive = sense * bodies.sliding[i] * bodies.rim_speed[i] * rubbed
+            accumulator.friction_work[i] += friction_work
+        observe_rub(drive, friction_work, accumulator)
+        accumulator.energy[DAMPING_LOSS] += drive - friction_work

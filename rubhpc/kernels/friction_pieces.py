@@ -15,8 +15,9 @@ from rubhpc.kernels.case_progress import (
     MODE_WANTED,
     Clock,
     Progress,
+    Sections,
 )
-from rubhpc.kernels.contact_modes import FORCED_LEVEL, ModeTables, Reduced, dot, is_within
+from rubhpc.kernels.contact_modes import FORCED_LEVEL, ModeTables, Reduced, dot
 from rubhpc.kernels.event_forces import FrictionWork  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.friction_change import change_states
 from rubhpc.kernels.friction_loop import advance_with_friction
@@ -32,7 +33,6 @@ from rubhpc.kernels.friction_states import (
 from rubhpc.kernels.mode_change import product
 from rubhpc.kernels.penalty_events import pressed_pairs
 from rubhpc.kernels.pieces import (
-    IN_PART,
     PART,
     PART_TO_BEGIN,
     PIECE,
@@ -43,8 +43,8 @@ from rubhpc.kernels.pieces import (
     begin_part,
     begin_piece,
     clock_of,
+    end_part,
     end_piece,
-    read_motion,
     row_of,
     set_masks,
     start_piece,
@@ -53,7 +53,6 @@ from rubhpc.kernels.pieces import (
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
     from rubhpc.kernels.sampling import Recorder
-    from rubhpc.kernels.transitions import Transitions
 
 Floats = NDArray[np.float64]
 
@@ -76,12 +75,11 @@ def advance_friction_pieces(
     recorder: Recorder,
     samples: Samples,
     sums: Accumulator,
-    transitions: Transitions,
+    sections: Sections,
 ) -> int:
     """Advance a case through pieces, as `piece_loop.advance_pieces` does.
 
-    `bodies.rim_speed` is that of `reduced`; `bodies.turned` is set. There are no `transitions`: modes change
-    from piece to piece.
+    `bodies.rim_speed` is that of `reduced`; `bodies.turned` is set.
 
     Returns
     -------
@@ -112,11 +110,8 @@ def advance_friction_pieces(
             place = 1 + piece * n_part + at[PART]
             part = row_of(sums, place)
             if at[STAGE] == PART_TO_BEGIN:
-                since = pieces.since[piece] if at[PART] == 0 else 0.0
                 closed = closed_set(tables.mask[progress.mode], part.is_touching.size)
-                begin_part(part, row_of(sums, place - 1), since, closed)
-                progress.next_sample, progress.n_event = at[PART] * pieces.n_part_sample, 0
-                at[STAGE] = IN_PART
+                begin_part(pieces, progress, part, row_of(sums, place - 1), closed)
             last_tick = ((at[PART] + 1) * pieces.n_part_sample) << clock.sample_level
             outcome = advance_with_friction(
                 tables,
@@ -133,23 +128,12 @@ def advance_friction_pieces(
                 recorder,
                 samples,
                 part,
-                transitions,
+                sections,
             )
             if outcome != FINISHED:
                 return outcome
-            read_motion(tables, progress.mode, z, pieces.motion[piece + 1])
-            if not is_within(
-                pieces.motion[piece + 1],
-                reduced.translations,
-                reduced.stiffness,
-                part.highest,
-                part.lowest,
-                reduced.displacement_limit,
-                pieces.energy_limit,
-            ):
+            if not end_part(tables, reduced, pieces, progress.mode, z, part):
                 return DIVERGED
-            at[PART] += 1
-            at[STAGE] = PART_TO_BEGIN
         read_pressing(tables, bodies, progress.mode, z, pieces.pressing[piece + 1])
         end_piece(pieces, piece, progress.n_step, tables.mask[progress.mode], z, samples)
     return FINISHED

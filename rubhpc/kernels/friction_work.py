@@ -8,12 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, short_loops
-from rubhpc.kernels.contact_modes import ModeTables, dot
+from rubhpc.kernels.contact_modes import ModeTables, copy_coordinates, dot, used_width
 from rubhpc.kernels.coordinate_steps import turn_on
 from rubhpc.kernels.cubics import turning_value
 from rubhpc.kernels.event_search import longest_move, move_stuck
-from rubhpc.kernels.friction_coordinates import used_width
-from rubhpc.kernels.friction_spans import copy_coordinates
 from rubhpc.kernels.friction_states import FrictionBodies, stuck_pairs
 
 if TYPE_CHECKING:
@@ -115,28 +113,6 @@ def rub_through(
         start, at = at, start
     gained, _ = gains(tables, mode, i, left * clock.tick, start, z)
     return total + gained * before, least, most
-
-
-@jit_inline_sum
-def still_rub(tables: ModeTables, mode: int, i: int, time: float, begun: Floats, z: Floats) -> float:
-    """What the form of sliding pair i (`Transitions.rub`) lacks of the integral of force times slip, N m.
-
-    That is the mean of the unbalance response, and all of the coordinates (2, m) that do not move or grow
-    linearly over the `time` (s) of a span.
-    """
-    first, n_still = tables.n_eigenmode[mode], tables.switch_re.shape[1] + 1
-    force_re, force_im = tables.switch_re[mode, 2 * i], tables.switch_im[mode, 2 * i]
-    slip_re, slip_im = tables.switch_re[mode, 2 * i + 1], tables.switch_im[mode, 2 * i + 1]
-    square = begun[0, first] * begun[0, first] + begun[1, first] * begun[1, first]
-    mean = 0.5 * square * (force_re[first] * slip_re[first] + force_im[first] * slip_im[first])
-    force, slip, next_force, next_slip = 0.0, 0.0, 0.0, 0.0
-    for k in range(first + 1, first + 1 + n_still):
-        force += force_re[k] * begun[0, k]
-        slip += slip_re[k] * begun[0, k]
-        next_force += force_re[k] * z[0, k]
-        next_slip += slip_re[k] * z[0, k]
-    mean += (force * slip + next_force * next_slip) / 3.0 + (force * next_slip + next_force * slip) / 6.0
-    return float(mean * time)
 
 
 @jit_inline_sum

@@ -18,10 +18,13 @@ from rubhpc.kernels.accumulators import (
 from rubhpc.kernels.case_progress import NONE, Clock, Progress
 from rubhpc.kernels.contact_modes import (
     DYING,
+    LANES,
     ModeTables,
     Reduced,
+    copy_coordinates,
     dot,
     resolved_time,
+    used_width,
 )
 from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
 
@@ -141,36 +144,69 @@ def observe_step(
 
 
 @jit_lean_sum
-def energy_forms(
-    loss_form: Floats, work_re: Floats, work_im: Floats, first: int, mode: int, z: Floats, entry: Floats
-) -> None:
-    """Fill `entry` (2,), J, with the forms whose growth is damping loss and unbalance work in a contact mode.
+def energies_gained(tables: ModeTables, mode: int, begun: Floats, z: Floats, gained: Floats) -> None:
+    """Fill `gained` (2,), J, with damping loss and unbalance work between coordinates (2, m) of a mode.
 
-    The arrays are `loss`, `work_re` and `work_im` of the tables; `first` is the mode's number of eigenmodes.
+    The form of the loss is read once for both, and what is beside its diagonal, which is symmetric, once.
     """
-    m = z.shape[1]
-    if loss_form.shape[1] == 0:  # tables without energies
-        entry[0], entry[1] = 0.0, 0.0
+    m, used = z.shape[1], used_width(tables, mode)
+    form, z_re, z_im = tables.loss[mode], z[0, :used], z[1, :used]
+    y_re, y_im = begun[0, :used], begun[1, :used]
+    if form.shape[0] == 0:  # tables without energies
+        gained[0], gained[1] = 0.0, 0.0
         return
+    gained[1] = work_form(tables, mode, z_re, z_im) - work_form(tables, mode, y_re, y_im)
     loss = 0.0
-    for part in range(2):
-        for k in range(m):
-            if z[part, k] != 0.0:
-                row = loss_form[mode, part * m + k]
-                along = 0.0
-                for j in range(m):
-                    along += row[j] * z[0, j] + row[m + j] * z[1, j]
-                loss += along * z[part, k]
-    cosine, sine = z[0, first], z[1, first]
+    for k in range(0, used, 4):  # four rows at a time: one would wait for its sum
+        block = k - k % LANES  # where the block on the diagonal begins
+        one, two, three, four = form[k], form[k + 1], form[k + 2], form[k + 3]
+        a, b, c, d = z_re[k], z_re[k + 1], z_re[k + 2], z_re[k + 3]
+        e, f, g, h = y_re[k], y_re[k + 1], y_re[k + 2], y_re[k + 3]
+        aside, within = 0.0, 0.0
+        for j in range(block):
+            aside += (a * one[j] + b * two[j] + c * three[j] + d * four[j]) * z_re[j]
+            aside -= (e * one[j] + f * two[j] + g * three[j] + h * four[j]) * y_re[j]
+        for j in range(block, block + LANES):
+            within += (a * one[j] + b * two[j] + c * three[j] + d * four[j]) * z_re[j]
+            within -= (e * one[j] + f * two[j] + g * three[j] + h * four[j]) * y_re[j]
+        one, two, three, four = form[m + k], form[m + k + 1], form[m + k + 2], form[m + k + 3]
+        a, b, c, d = z_im[k], z_im[k + 1], z_im[k + 2], z_im[k + 3]
+        e, f, g, h = y_im[k], y_im[k + 1], y_im[k + 2], y_im[k + 3]
+        if abs(a) + abs(b) + abs(c) + abs(d) + abs(e) + abs(f) + abs(g) + abs(h) != 0.0:
+            for j in range(used):
+                aside += (a * one[j] + b * two[j] + c * three[j] + d * four[j]) * z_re[j]
+                aside -= (e * one[j] + f * two[j] + g * three[j] + h * four[j]) * y_re[j]
+            for j in range(block):
+                aside += (a * one[m + j] + b * two[m + j] + c * three[m + j] + d * four[m + j]) * z_im[j]
+                aside -= (e * one[m + j] + f * two[m + j] + g * three[m + j] + h * four[m + j]) * y_im[j]
+            for j in range(block, block + LANES):
+                within += (a * one[m + j] + b * two[m + j] + c * three[m + j] + d * four[m + j]) * z_im[j]
+                within -= (e * one[m + j] + f * two[m + j] + g * three[m + j] + h * four[m + j]) * y_im[j]
+        loss += 2.0 * aside + within
+    gained[0] = loss
+
+
+@jit_inline_sum
+def work_form(tables: ModeTables, mode: int, z_re: Floats, z_im: Floats) -> float:
+    """What grows by the work of the unbalance, J."""
+    first = tables.n_eigenmode[mode]
+    cosine, sine = z_re[first], z_im[first]
     work = 0.0
     for part in range(2):  # exp(i angle), then its conjugate
+        re, im = tables.work_re[mode, part], tables.work_im[mode, part]
         real, imaginary = 0.0, 0.0
-        for k in range(m):
-            a, b = work_re[mode, part, k], work_im[mode, part, k]
-            real += a * z[0, k] - b * z[1, k]
-            imaginary += a * z[1, k] + b * z[0, k]
+        for k in range(z_re.size):
+            real += re[k] * z_re[k] - im[k] * z_im[k]
+            imaginary += re[k] * z_im[k] + im[k] * z_re[k]
         work += cosine * real - (sine if part == 0 else -sine) * imaginary
-    entry[0], entry[1] = loss, work
+    return work
+
+
+@jit_inline_sum
+def begin_span(z: Floats, progress: Progress, recorder: Recorder) -> None:
+    """Begin to add energies at the current tick, where the coordinates are `z` (2, m)."""
+    copy_coordinates(z, recorder.begun)
+    progress.energy_from = progress.tick
 
 
 @jit_part_sum
@@ -188,20 +224,9 @@ def end_span(
     """
     if progress.energy_from < 0:
         return
-    mode = progress.mode
+    mode, gained = progress.mode, recorder.gained
     time = (progress.tick - progress.energy_from) * clock.tick
-    loss, work = recorder.entry[0], recorder.entry[1]
-    first = tables.n_eigenmode[mode]
-    energy_forms(tables.loss, tables.work_re, tables.work_im, first, mode, z, recorder.entry)
-    accumulator.energy[DAMPING_LOSS] += recorder.entry[0] - loss + tables.steady_power[mode, 0] * time
-    accumulator.energy[UNBALANCE_WORK] += recorder.entry[1] - work + tables.steady_power[mode, 1] * time
+    energies_gained(tables, mode, recorder.begun, z, gained)
+    accumulator.energy[DAMPING_LOSS] += gained[0] + tables.steady_power[mode, 0] * time
+    accumulator.energy[UNBALANCE_WORK] += gained[1] + tables.steady_power[mode, 1] * time
     progress.energy_from = NONE
-
-
-@jit_inline_sum
-def begin_span(tables: ModeTables, z: Floats, progress: Progress, recorder: Recorder) -> None:
-    """Begin to add energies at the current tick, in the current contact mode."""
-    mode = progress.mode
-    first = tables.n_eigenmode[mode]
-    energy_forms(tables.loss, tables.work_re, tables.work_im, first, mode, z, recorder.entry)
-    progress.energy_from = progress.tick

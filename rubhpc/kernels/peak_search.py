@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, jit_part_sum
 from rubhpc.kernels.accumulators import observe_force
-from rubhpc.kernels.contact_modes import DYING, RESOLVED, ModeTables, dot
+from rubhpc.kernels.contact_modes import DYING, RESOLVED, ModeTables, copy_coordinates, dot
 from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.event_search import longest_move, move_ticks
 from rubhpc.kernels.force_average import AVERAGING_TIME, BEGIN, COUNT, END, IMPULSE, OLDEST
-from rubhpc.kernels.friction_spans import copy_coordinates
 from rubhpc.kernels.friction_states import STUCK, FrictionBodies, state_of
 from rubhpc.kernels.friction_work import gains
 
@@ -71,30 +70,25 @@ def follow_force(
     bodies: FrictionBodies,
     clock: Clock,
     mode: int,
-    s: int,
     i: int,
+    begin: int,
     now: int,
     stop: int,
     calm_from: int,
     calm_to: int,
+    z: Floats,
     recorder: Recorder,
     accumulator: Accumulator,
 ) -> None:
-    """Add the force of closed pair i in span s between two ticks.
+    """Add the force of closed pair i between two ticks of a span, at the first of them with `z` (2, m).
 
     What an event sets off is fast at first: no piece but the first is longer than the contact mode has
     lasted. From `calm_from` to `calm_to` pieces are long.
     """
-    spans = recorder.spans
-    at, ahead, begin = spans.path[2], spans.path[3], spans.tick[s, 0]
-    copy_coordinates(spans.begun[s], at)
-    copy_coordinates(at, ahead)
-    passed, first = begin, int(FIRST * AVERAGING_TIME / clock.tick) + 1
-    while passed < now:  # in few moves: spans are longer than the exponentials reach
-        count = min(longest_move(tables), now - passed)
-        move_ticks(tables, bodies, mode, count, clock.tick, at, ahead)
-        passed += count
-        at, ahead = ahead, at
+    at, ahead = recorder.path[2], recorder.path[3]
+    copy_coordinates(z, at)
+    copy_coordinates(z, ahead)
+    first = int(FIRST * AVERAGING_TIME / clock.tick) + 1
     is_stuck = state_of(tables.mask[mode], i) == STUCK
     share = 0.5 / bodies.static[i] if is_stuck else 1.0
     before = force_at(tables, mode, i, share, is_stuck, at)

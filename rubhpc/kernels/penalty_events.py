@@ -46,22 +46,30 @@ def pressed_pairs(reduced: Reduced, motion: Floats) -> int:
 
 
 @jit_lean_sum
+def pressed_or_lifted(
+    reduced: Reduced, i: int, is_crossed: bool, is_pressed: bool, is_lifted: bool, motion: Floats
+) -> tuple[bool, bool]:
+    """Whether pair i is pressed after an event, and whether it is lifted.
+
+    `is_crossed`: the event is that of its gap, or of its force.
+    """
+    if not is_crossed:
+        return is_pressed, is_lifted and gap_of(reduced, i, motion) < 0.0
+    if is_pressed:
+        return False, reduced.damper > 0.0
+    return not is_lifted or gap_of(reduced, i, motion) < 0.0, False
+
+
+@jit_lean_sum
 def change_pressed(reduced: Reduced, states: int, crossing: int, motion: Floats) -> int:
     """States after the switch functions `crossing` (bits) vanish, in a motion (2 n,)."""
     q = reduced.gap_jacobian.shape[0]
     found = int(np.int64(0))
     for i in range(q):
-        is_pressed, is_lifted = (states >> i) & 1 == 1, (states >> (q + i)) & 1 == 1
-        if (crossing >> i) & 1 == 1:
-            if is_pressed:
-                is_pressed, is_lifted = False, reduced.damper > 0.0
-            elif is_lifted:
-                is_pressed = gap_of(reduced, i, motion) < 0.0
-                is_lifted = False
-            else:
-                is_pressed = True
-        elif is_lifted:
-            is_lifted = gap_of(reduced, i, motion) < 0.0
+        was_pressed, was_lifted = (states >> i) & 1 == 1, (states >> (q + i)) & 1 == 1
+        is_pressed, is_lifted = pressed_or_lifted(
+            reduced, i, (crossing >> i) & 1 == 1, was_pressed, was_lifted, motion
+        )
         if is_pressed:
             found |= 1 << i
         elif is_lifted:

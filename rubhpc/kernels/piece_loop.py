@@ -8,12 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_lean_sum
-from rubhpc.kernels.case_progress import DIVERGED, FINISHED, MODE_WANTED, Clock, Progress
-from rubhpc.kernels.contact_modes import ModeTables, Reduced, dot, is_within
+from rubhpc.kernels.case_progress import DIVERGED, FINISHED, MODE_WANTED, Clock, Progress, Sections
+from rubhpc.kernels.contact_modes import ModeTables, Reduced, dot
 from rubhpc.kernels.event_loop import advance
 from rubhpc.kernels.penalty_events import pressed_pairs
 from rubhpc.kernels.pieces import (
-    IN_PART,
     PART,
     PART_TO_BEGIN,
     PIECE,
@@ -24,8 +23,8 @@ from rubhpc.kernels.pieces import (
     begin_part,
     begin_piece,
     clock_of,
+    end_part,
     end_piece,
-    read_motion,
     row_of,
     set_masks,
     start_piece,
@@ -53,6 +52,7 @@ def advance_pieces(
     recorder: Recorder,
     samples: Samples,
     sums: Accumulator,
+    sections: Sections,
 ) -> int:
     """Advance a case through pieces, from `pieces.at` on, and record every sample.
 
@@ -68,6 +68,8 @@ def advance_pieces(
         Of one piece.
     sums : Accumulator
         (1 + k c, ...) each: of the time before, then of every part of the pieces, zero on entry.
+    sections : Sections
+        None.
 
     Returns
     -------
@@ -92,10 +94,7 @@ def advance_pieces(
             place = 1 + piece * n_part + at[PART]
             part = row_of(sums, place)
             if at[STAGE] == PART_TO_BEGIN:
-                since = pieces.since[piece] if at[PART] == 0 else 0.0
-                begin_part(part, row_of(sums, place - 1), since, tables.mask[progress.mode])
-                progress.next_sample, progress.n_event = at[PART] * pieces.n_part_sample, 0
-                at[STAGE] = IN_PART
+                begin_part(pieces, progress, part, row_of(sums, place - 1), tables.mask[progress.mode])
             last_tick = ((at[PART] + 1) * pieces.n_part_sample) << clock.sample_level
             outcome = advance(
                 tables,
@@ -111,22 +110,12 @@ def advance_pieces(
                 recorder,
                 samples,
                 part,
+                sections,
             )
             if outcome != FINISHED:
                 return outcome
-            read_motion(tables, progress.mode, z, pieces.motion[piece + 1])
-            if not is_within(
-                pieces.motion[piece + 1],
-                reduced.translations,
-                reduced.stiffness,
-                part.highest,
-                part.lowest,
-                reduced.displacement_limit,
-                pieces.energy_limit,
-            ):
+            if not end_part(tables, reduced, pieces, progress.mode, z, part):
                 return DIVERGED
-            at[PART] += 1
-            at[STAGE] = PART_TO_BEGIN
         read_forces(tables, progress.mode, z, pieces.pressing[piece + 1])
         end_piece(pieces, piece, progress.n_step, tables.mask[progress.mode], z, samples)
     return FINISHED

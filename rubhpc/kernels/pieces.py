@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.accumulators import Accumulator
 from rubhpc.kernels.case_progress import LONG_AGO, NONE, Clock, Progress
-from rubhpc.kernels.contact_modes import DYING, ModeTables, Reduced, dot, enter, find_mode
+from rubhpc.kernels.contact_modes import DYING, ModeTables, Reduced, enter, find_mode, is_within, leave
 from rubhpc.kernels.force_average import LOUD
 
 if TYPE_CHECKING:
@@ -160,16 +160,14 @@ def begin_piece(
     return True
 
 
-@jit_lean_sum
-def read_motion(tables: ModeTables, mode: int, z: Floats, motion: Floats) -> None:
-    """Fill in the reduced motion (2 n,) of coordinates (2, m)."""
-    for row in range(motion.size):
-        motion[row] = dot(tables.motion_re[mode, row], tables.motion_im[mode, row], z[0], z[1])
-
-
 @jit_inline_sum
-def begin_part(part: Accumulator, before: Accumulator, since: float, closed: int) -> None:
-    """Continue from the sums before, whose clock began `since` (s) ago; pairs of `closed` are touching."""
+def begin_part(
+    pieces: Pieces, progress: Progress, part: Accumulator, before: Accumulator, closed: int
+) -> None:
+    """Continue from the sums before; pairs of `closed` are touching."""
+    since = pieces.since[pieces.at[PIECE]] if pieces.at[PART] == 0 else 0.0  # s, when their clock began
+    progress.next_sample, progress.n_event = pieces.at[PART] * pieces.n_part_sample, 0
+    pieces.at[STAGE] = IN_PART
     q, n_row, n = part.force_piece.shape
     for i in range(q):
         for row in range(n_row):
@@ -181,6 +179,28 @@ def begin_part(part: Accumulator, before: Accumulator, since: float, closed: int
     part.origin[0] = before.origin[0] + since
     for i in range(part.is_touching.size):
         part.is_touching[i] = (closed >> i) & 1 == 1
+
+
+@jit_lean_sum
+def end_part(
+    tables: ModeTables, reduced: Reduced, pieces: Pieces, mode: int, z: Floats, part: Accumulator
+) -> bool:
+    """Go on to the next part, with the motion of coordinates (2, m); False where it is beyond the limits."""
+    motion = pieces.motion[pieces.at[PIECE] + 1]
+    leave(tables, mode, z, motion)
+    if not is_within(
+        motion,
+        reduced.translations,
+        reduced.stiffness,
+        part.highest,
+        part.lowest,
+        reduced.displacement_limit,
+        pieces.energy_limit,
+    ):
+        return False
+    pieces.at[PART] += 1
+    pieces.at[STAGE] = PART_TO_BEGIN
+    return True
 
 
 @jit_inline_sum

@@ -17,6 +17,7 @@ from rubhpc.kernels.accumulators import (
     Samples,
 )
 from rubhpc.kernels.contact_modes import (
+    LANES,
     LATERAL_RATE,
     LATERAL_ROW,
     N_ROTOR_ROW,
@@ -25,11 +26,8 @@ from rubhpc.kernels.contact_modes import (
     ModeTables,
 )
 from rubhpc.kernels.cubics import turning_value
-from rubhpc.kernels.friction_spans import Spans, no_spans
 
 Floats = NDArray[np.float64]
-
-LANES = 8  # outputs are read in whole vectors
 
 
 class Recorder(NamedTuple):
@@ -38,20 +36,32 @@ class Recorder(NamedTuple):
     value: Floats  # (SAMPLES_AT_ONCE o,), outputs sample by sample
     last: Floats  # (2, 3 + q), signals with extrema and their rates at the last sample; NaN before the first
     node: Floats  # (4, q), force, slip speed (N, m/s) and their rates of closed pairs at the last step
-    entry: Floats  # (2,), J, forms of damping loss and unbalance work where the span began
-    spans: Spans  # those not yet measured (set-valued friction)
+    begun: Floats  # (2, m), coordinates where the span under way began, in one contact mode throughout
+    gained: Floats  # (2,), J, damping loss and unbalance work since then, but for their steady parts
+    # Under set-valued friction:
+    given: Floats  # (q,), normal impulses of the event that ends the span, N s
+    pair: Floats  # (q, 6), force of each pair within the span (`span_forces`)
+    path: Floats  # (4, 2, m), coordinates within it
 
 
 def recorder(q: int, n_probe: int = 0) -> Recorder:
-    """Work space for q pairs and the probes, before the first sample."""
+    """Work space for q pairs and the probes, before the first sample; without that for coordinates."""
     n_row = N_ROTOR_ROW + 3 * q + n_probe
     return Recorder(
         value=np.zeros(SAMPLES_AT_ONCE * n_row),
         last=np.full((2, 3 + q), np.nan),
         node=np.zeros((4, q)),
-        entry=np.zeros(2),
-        spans=no_spans(),
+        begun=np.zeros((2, 0)),
+        gained=np.zeros(2),
+        given=np.zeros(q),
+        pair=np.zeros((q, 6)),
+        path=np.zeros((4, 2, 0)),
     )
+
+
+def with_coordinates(recorder: Recorder, m: int) -> Recorder:
+    """The same with work space for m coordinates."""
+    return recorder._replace(begun=np.zeros((2, m)), path=np.zeros((4, 2, m)))
 
 
 @jit_inline_sum

@@ -13,16 +13,9 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import jit_lean_sum
 from rubhpc.kernels.contact_modes import Reduced  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.event_forces import FrictionWork  # noqa: TC001 - likewise
-from rubhpc.kernels.friction_states import (
-    BACKWARD,
-    FORWARD,
-    OPEN,
-    STUCK,
-    lifted_place,
-    state_of,
-)
+from rubhpc.kernels.friction_states import OPEN, STUCK, lifted_place, state_of
 from rubhpc.kernels.mode_change import GAP_TOLERANCE
-from rubhpc.kernels.penalty_events import force_of, gap_of
+from rubhpc.kernels.penalty_events import force_of, pressed_or_lifted
 
 Floats = NDArray[np.float64]
 
@@ -44,15 +37,9 @@ def press_pairs(
     for i in range(q):
         state = state_of(states, i)
         first, second = (crossing >> (2 * i)) & 1, (crossing >> (2 * i + 1)) & 1
-        is_closed = state != OPEN
-        is_lifted = (states >> lifted_place(q, i)) & 1 == 1
-        if state == OPEN and first == 1:
-            is_closed = not is_lifted or gap_of(reduced, i, motion) < 0.0
-            is_lifted = False
-        elif state in (FORWARD, BACKWARD) and first == 1:
-            is_closed, is_lifted = False, reduced.damper > 0.0
-        elif is_lifted:
-            is_lifted = gap_of(reduced, i, motion) < 0.0
+        was_lifted = (states >> lifted_place(q, i)) & 1 == 1
+        is_crossed = state != STUCK and first == 1
+        is_closed, is_lifted = pressed_or_lifted(reduced, i, is_crossed, state != OPEN, was_lifted, motion)
         if is_lifted:
             lifted |= 1 << lifted_place(q, i)
         solver.is_sticking[i] = state == STUCK and first == 0 and second == 0

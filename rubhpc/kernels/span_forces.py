@@ -13,18 +13,6 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, short_loops
 from rubhpc.kernels.force_average import AVERAGING_TIME
-from rubhpc.kernels.friction_spans import (
-    AFTER,
-    BEFORE,
-    EXCESS,
-    IMPULSE,
-    MOST,
-    PRIMITIVE,
-    RAMP,
-    RUBBED,
-    STEADY,
-    VALUE,
-)
 from rubhpc.kernels.friction_states import STUCK, FrictionBodies, state_of
 
 if TYPE_CHECKING:
@@ -32,6 +20,10 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
+# Columns of `Recorder.pair`. Of the force where a part begins: value, N, primitive, N s, steady part, N,
+# growth, N/s, and by how much its means may exceed a parabola, N. Then the integral of the friction of a pair
+# that sticks, and of the force of one that slides, N s.
+VALUE, PRIMITIVE, STEADY, RAMP, EXCESS, RUBBED = range(6)
 MISSED = float(np.sqrt(3.0)) / 216.0  # of the third derivative times the length to the third: by a parabola
 SHARED = 1.5  # by how much the mean of a parabola with the impulse of a part may exceed its own, in its terms
 
@@ -115,9 +107,11 @@ def pass_force(
     is_last: bool,
     z: Floats,
     pair: Floats,
-    part: Floats,
-) -> None:
-    """Fill in a `part` of a span, between times (s) counted from its begin, that ends with `z` (2, m)."""
+) -> tuple[float, float, float, float]:
+    """Force at both ends (N), impulse (N s) and bound on the means (N) of the force in a part of a span.
+
+    It lies between times (s) counted from the begin of the span, and ends with `z` (2, m).
+    """
     is_stuck = state_of(tables.mask[mode], i) == STUCK
     share = 0.5 / bodies.static[i] if is_stuck else 1.0
     value, primitive = read_force(tables, mode, 2 * i, z)
@@ -130,9 +124,9 @@ def pass_force(
     steady = pair[STEADY] + 0.5 * pair[RAMP] * (since + until)
     impulse = primitive - pair[PRIMITIVE] + steady * time
     most = highest(impulse / time, pair[VALUE], value) + pair[EXCESS]
-    part[BEFORE], part[AFTER], part[IMPULSE], part[MOST] = pair[VALUE], value, impulse, most
-    pair[VALUE], pair[PRIMITIVE] = value, primitive
+    before, pair[VALUE], pair[PRIMITIVE] = pair[VALUE], value, primitive
     pair[RUBBED] += 0.0 if is_stuck else impulse
+    return before, value, impulse, most
 
 
 @jit_inline_sum

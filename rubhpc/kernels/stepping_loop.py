@@ -287,7 +287,7 @@ def advance_by_steps(
             for k in range(x.size):
                 x[k] = x_after[k]
         elif is_recorded and progress.energy_from < 0:
-            begin_span(tables, z, progress, recorder)
+            begin_span(z, progress, recorder)
         is_placed = is_touching
         if not (is_near and is_followed):
             before[0] = np.nan

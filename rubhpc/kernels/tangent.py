@@ -17,12 +17,10 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
 from rubhpc.kernels.complementarity import solve_active
-from rubhpc.kernels.contact_modes import ModeTables, Reduced, add_rows, dot
+from rubhpc.kernels.contact_modes import ModeTables, Reduced, add_rows, copy_coordinates, dot, leave
 from rubhpc.kernels.coordinate_steps import floor_log2, turn_on
-from rubhpc.kernels.friction_spans import copy_coordinates
 from rubhpc.kernels.mode_change import AT_REST, product
 from rubhpc.kernels.trail import Trail  # noqa: TC001 - part of a kernel's signature
-from rubhpc.kernels.transitions import UNKNOWN, Transitions, add_impulses, pass_over, see
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -95,7 +93,6 @@ def carry_along(
     per_revolution: int,
     trail: Trail,
     modes: TrailModes,
-    transitions: Transitions,
     tangent: Tangent,
 ) -> int:
     """Propagate a displacement along a trail: `tangent.grown.size` revolutions of `per_revolution` ticks.
@@ -128,7 +125,7 @@ def carry_along(
             turn = (reached[REVOLUTION] + 1) * per_revolution
             move(tables, place, turn - reached[PASSED], d)
             reached[PASSED] = turn
-            read_displacement(tables, place, tangent)
+            leave(tables, place, d, tangent.motion)
             size = size_of(tangent.motion, spin)
             tangent.grown[reached[REVOLUTION]] = np.log(max(size, LOST))
             reached[REVOLUTION] += 1
@@ -141,7 +138,7 @@ def carry_along(
                     tangent.motion[i] = tangent.generic[i]
                 enter_displacement(tables, place, 0.0, 0.0, tangent)
         if k == n_event:
-            read_displacement(tables, place, tangent)
+            leave(tables, place, d, tangent.motion)
             return ALL_CARRIED
         following = modes.of_piece[k + 1]
         next_place = modes.place[following]
@@ -165,24 +162,10 @@ def carry_along(
             add_rate(shift, exponent, drift, z, d)
             forced = tables.n_eigenmode[place]
             cosine_rate, sine_rate = d[0, forced], d[1, forced]
-        strikes, passed = is_touching and reduced.spring == 0.0, UNKNOWN
-        if transitions.mode.size > 0:
-            passed = transitions.entry[place, next_place]
-        if passed >= 0:
-            q, m = reduced.radius.size, d.shape[1]
-            if strikes:
-                for i in range(q):
-                    tangent.rate[0, i], tangent.rate[1, i], _, _ = see(transitions, place, m, i, m, d)
-                strike(reduced, True, trail.given[k], trail.rate[k], tangent)
-            pass_over(transitions, passed, m, d, z)
-            if strikes:
-                add_impulses(transitions, next_place, q, m, tangent.given, z)
-            copy_coordinates(z, d)
-        else:
-            read_displacement(tables, place, tangent)
-            if strikes:
-                strike_motion(reduced, modes.has_states, trail.given[k], trail.rate[k], tangent)
-            enter_displacement(tables, next_place, cosine_rate, sine_rate, tangent)
+        leave(tables, place, d, tangent.motion)
+        if is_touching and reduced.spring == 0.0:
+            strike_motion(reduced, modes.has_states, trail.given[k], trail.rate[k], tangent)
+        enter_displacement(tables, next_place, cosine_rate, sine_rate, tangent)
         if shift != 0.0:
             copy_coordinates(trail.begun[k + 1], z)
             add_rate(-shift, modes.exponent[following], modes.drift[following], z, d)
@@ -208,15 +191,6 @@ def add_rate(time: float, exponent: Floats, drift: Floats, z: Floats, d: Floats)
         growth, turning = time * exponent[0, i], time * exponent[1, i]
         d[0, i] += growth * z[0, i] - turning * z[1, i] + time * drift[i]
         d[1, i] += growth * z[1, i] + turning * z[0, i]
-
-
-@jit_lean_sum
-def read_displacement(tables: ModeTables, place: int, tangent: Tangent) -> None:
-    """Fill `tangent.motion` from the coordinates."""
-    re, im, d, motion = tables.motion_re[place], tables.motion_im[place], tangent.d, tangent.motion
-    d_re, d_im = d[0], d[1]
-    for row in range(motion.size):
-        motion[row] = dot(re[row], im[row], d_re, d_im)
 
 
 @jit_lean_sum

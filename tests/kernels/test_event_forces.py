@@ -48,7 +48,7 @@ def event(random, q):
     solver = empty_workspace(q)
     solver.matrix[:], solver.coupling[:] = gap_jacobian @ gap_jacobian.T, gap_jacobian @ along.T
     solver.tangential[:] = -along @ gap_jacobian.T, -along @ along.T
-    work = event_forces.friction_work(solver, q, n)
+    work = event_forces.friction_work(solver, q)
     sliding = random.uniform(0.05, 0.4, q)
     bodies = FrictionBodies(sliding, sliding * random.choice([1.0, 1.3]), *np.zeros((3, q)))
     states = random.choice([FORWARD, BACKWARD, STUCK], q).tolist()

@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.integrate.changing_speed.followed_modes import NOTHING
-from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
+from rubhpc.kernels.contact_modes import LANES, SAMPLES_AT_ONCE
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL
 from rubhpc.kernels.retuning import HeldMode, Speeds
 from rubhpc.kernels.retuning_laws import NO_RIM, RimPart
-from rubhpc.kernels.sampling import LANES
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -15,7 +15,7 @@ from rubhpc.integrate.reduced_model.mode_library import SPARE
 from rubhpc.integrate.reduced_model.penalty_library import PressedPairs
 from rubhpc.integrate.reduced_model.penalty_mode import overlap_rows
 from rubhpc.integrate.reduced_model.touching import friction_mode_among, penalty_mode_among
-from rubhpc.kernels.friction_coordinates import LANES
+from rubhpc.kernels.contact_modes import LANES
 from rubhpc.kernels.friction_states import BACKWARD, OPEN, STUCK, lifted_place
 from rubhpc.kernels.retuning_laws import RimPart, Springs
 

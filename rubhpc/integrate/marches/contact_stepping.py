@@ -13,6 +13,7 @@ from rubhpc.integrate.packing import pairs_of
 from rubhpc.kernels.case_progress import FINISHED, NONE, shaft_turn
 from rubhpc.kernels.contact_pairs import N_DEGREE
 from rubhpc.kernels.measuring import end_span
+from rubhpc.kernels.sampling import with_coordinates
 from rubhpc.kernels.stepping_loop import ContactImpulses, advance_by_steps
 
 if TYPE_CHECKING:
@@ -85,7 +86,7 @@ class ContactSteppingMarch(ModalMarch):
 
         Up to the next whole step the motion is that of open contacts.
         """
-        self.clock, self._recorder = clock, recorder
+        self.clock, self._recorder = clock, with_coordinates(recorder, self._z.shape[1])
         cosine, sine = shaft_turn(clock, self.progress.tick)
         self._enter_at(0, self._clearance, cosine, sine, motion)
         level = 0

@@ -11,15 +11,13 @@ from rubhpc.fem.statics import sag_at_stators
 from rubhpc.integrate.marches.contact_sets import ContactSets
 from rubhpc.integrate.marches.march import ALL_SAMPLES
 from rubhpc.integrate.marches.met_modes import MetModes, NoClosedForm
-from rubhpc.kernels.case_progress import FINISHED, MODE_WANTED, PAUSED, restart_clock
+from rubhpc.kernels.case_progress import FINISHED, MODE_WANTED, NO_SECTIONS, PAUSED, Sections, restart_clock
 from rubhpc.kernels.contact_event import event_work
 from rubhpc.kernels.contact_modes import DYING
 from rubhpc.kernels.event_loop import advance
 from rubhpc.kernels.piece_loop import advance_pieces
 from rubhpc.kernels.pieces import FAST, QUICK
-from rubhpc.kernels.sections_loop import advance_sections
 from rubhpc.kernels.trail import Trail, begin_trail, new_trail, no_trail
-from rubhpc.kernels.transitions import NO_TRANSITIONS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -33,7 +31,6 @@ if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
     from rubhpc.kernels.case_progress import Progress
     from rubhpc.kernels.pieces import Pieces
-    from rubhpc.kernels.transitions import Transitions
 
     Floats = NDArray[np.float64]
 
@@ -76,11 +73,6 @@ class EventDrivenMarch(ContactSets):
         displacement = place.motion[: self.bodies.stiffness.shape[0]]
         open_: Floats = self._at_rest - sag_at_stators(setup.model)[0]
         return open_ + self.bodies.gap_jacobian @ displacement
-
-    @property
-    def transitions(self) -> Transitions:
-        """Transitions between the contact modes of the tables that are tabulated: none."""
-        return NO_TRANSITIONS
 
     def reached_in(self) -> tuple[int, Floats]:
         """Set of contacts in which the case stands, and a copy of its modal coordinates (2, m)."""
@@ -193,6 +185,7 @@ class EventDrivenMarch(ContactSets):
             self._recorder,
             samples,
             sums,
+            NO_SECTIONS,
         )
 
     def pass_sections(
@@ -283,30 +276,21 @@ class EventDrivenMarch(ContactSets):
 
     def _advance(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
         """Advance as `_kernel` does, up to a contact mode that the tables lack."""
+        return self._by_kernel(samples, accumulator, (last_tick, is_recorded))
+
+    def _by_kernel(
+        self,
+        samples: Samples,
+        accumulator: Accumulator,
+        to: tuple[int, bool],
+        sections: Sections = NO_SECTIONS,
+    ) -> int:
+        """Advance by the kernel `to` a tick, recorded or not, or by sections from it."""
         return advance(
             self.tables,
             self.bodies,
             self.clock,
-            last_tick,
-            is_recorded,
-            self._bare_progress,
-            self._z,
-            self._z_next,
-            self._motion,
-            self._event_work,
-            self._recorder,
-            samples,
-            accumulator,
-        )
-
-    def _advance_sections(self, samples: Samples, accumulator: Accumulator, sections: Floats) -> int:
-        """Advance as `_advance` does, revolution by revolution, up to sample 0."""
-        return advance_sections(
-            self.tables,
-            self.bodies,
-            self.clock,
-            self._setup.displacement_limit,
-            self._setup.energy_limit,
+            *to,
             self._bare_progress,
             self._z,
             self._z_next,
@@ -317,6 +301,20 @@ class EventDrivenMarch(ContactSets):
             accumulator,
             sections,
         )
+
+    def _advance_sections(self, samples: Samples, accumulator: Accumulator, sections: Floats) -> int:
+        """Advance as `_advance` does, revolution by revolution, up to sample 0."""
+        kept = Sections(sections, self._setup.energy_limit)
+        return self._by_kernel(samples, accumulator, (self._end_of_revolution(), False), sections=kept)
+
+    @property
+    def _per_revolution(self) -> int:
+        """Ticks of a revolution."""
+        return self.clock.samples_per_revolution << self.clock.sample_level
+
+    def _end_of_revolution(self) -> int:
+        """Tick at which the present revolution ends."""
+        return (int(self._bare_progress["tick"]) // self._per_revolution + 1) * self._per_revolution
 
     def _unsolved(self) -> str:
         raise NoClosedForm

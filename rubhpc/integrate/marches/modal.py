@@ -25,7 +25,7 @@ from rubhpc.kernels.case_progress import (
     restart_clock,
 )
 from rubhpc.kernels.contact_modes import enter_with, is_within
-from rubhpc.kernels.sampling import recorder
+from rubhpc.kernels.sampling import recorder, with_coordinates
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -167,6 +167,7 @@ class ModalMarch(March):
         m = tables.switch_re.shape[2]
         if self._z.shape[1] != m:
             self._z, self._z_next = aligned((2, m)), aligned((2, m))
+            self._recorder = with_coordinates(self._recorder, m)
 
     def _start(self, mode: int) -> None:
         """Begin in a contact mode of the tables, at the shaft's angle 0."""
@@ -178,6 +179,7 @@ class ModalMarch(March):
         tables = self.tables
         enter_with(
             int(tables.n_eigenmode[mode]),
+            self._z.shape[1],
             tables.enter_re[mode],
             tables.enter_im[mode],
             tables.enter_cosine[mode],

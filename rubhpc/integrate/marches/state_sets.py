@@ -62,7 +62,7 @@ class StateSets(EventDrivenMarch):
         solver.matrix[:], solver.coupling[:] = gap_jacobian @ gap_jacobian.T, gap_jacobian @ along.T
         solver.tangential[:] = -along @ gap_jacobian.T, -along @ along.T
         self._soften(solver)
-        return friction_work(solver, q, gap_jacobian.shape[1])
+        return friction_work(solver, q)
 
     def _friction_bodies(self) -> FrictionBodies:
         """What friction asks of the bodies at the speed that they turn at."""

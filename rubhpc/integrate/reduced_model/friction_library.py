@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Unpack
 from rubhpc.integrate.reduced_model.friction_mode import FrictionMode
 from rubhpc.integrate.reduced_model.mode_library import SPARE, ModeLibrary, Shared
 from rubhpc.integrate.reduced_model.touching import friction_mode_among
-from rubhpc.integrate.reduced_model.transitions import TransitionRoom
-from rubhpc.kernels.friction_coordinates import LANES
+from rubhpc.kernels.contact_modes import LANES
 from rubhpc.kernels.friction_states import FORWARD
 
 if TYPE_CHECKING:
@@ -45,12 +44,6 @@ class FrictionLibrary(ModeLibrary):
         """Start as `ModeLibrary` does, with one pair sliding forward."""
         self._pairs = pairs
         super().__init__(reduced, model, pairs.friction, **shared)
-        # No transitions are tabulated for overlaps, which need the motion at each event, nor for one pair,
-        # whose few modes stay in the cache. Where modes may be discarded, or are in two tables, they would
-        # depend on other cases.
-        q = len(pairs.gap_jacobian)
-        keeps_all = not self._is_large and 4**q <= self.n_most
-        self.transitions = TransitionRoom() if keeps_all and q > 1 and not pairs.stiffness else None
 
     _closed = FORWARD
 

@@ -14,8 +14,7 @@ from rubhpc.integrate.reduced_model.mode_tables import Spared, bytes_ahead, mode
 from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions
 from rubhpc.integrate.reduced_model.table_stack import MOST_BYTES, MOST_MODES, TableStack
 from rubhpc.integrate.reduced_model.touching import contact_mode_among, open_bodies
-from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
-from rubhpc.kernels.friction_coordinates import LANES
+from rubhpc.kernels.contact_modes import LANES, SAMPLES_AT_ONCE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
     from rubhpc.integrate.reduced_model.energy_forms import Energies
     from rubhpc.integrate.reduced_model.system_modes import Solved
     from rubhpc.integrate.reduced_model.touching import OpenBodies
-    from rubhpc.integrate.reduced_model.transitions import TransitionRoom
     from rubhpc.kernels import contact_modes as kernel
 
     Floats = NDArray[np.float64]
@@ -223,7 +221,6 @@ class ModeLibrary:
         """Exponents of a mode's coordinates, 1/s: (2, m), real and imaginary; drift (m,) of those at 0."""
         return self._exponents[mask]
 
-    transitions: TransitionRoom | None = None  # tabulated by cases; None: not allowed
     is_tuned_ahead = False  # whether modes are tuned to several pieces of a changing speed together
     _n_solved = 0
     _other: ModeLibrary | None = None  # for large modes: the library for following, or for measuring

@@ -12,8 +12,8 @@ from rubhpc.fem.computable import FAR_APART
 from rubhpc.integrate.reduced_model.energy_forms import Energies, growth_of
 from rubhpc.integrate.reduced_model.friction_mode import FrictionMode
 from rubhpc.kernels import contact_modes as kernel
+from rubhpc.kernels.contact_modes import LANES
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL
-from rubhpc.kernels.sampling import LANES
 
 if TYPE_CHECKING:
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode

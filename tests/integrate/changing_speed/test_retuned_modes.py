@@ -29,7 +29,7 @@ from rubhpc.integrate.reduced_model.touching import (
 from rubhpc.kernels.contact_modes import enter
 from rubhpc.kernels.curved_levels import fill_level
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, lifted_place
-from rubhpc.kernels.measuring import energy_forms
+from rubhpc.kernels.measuring import energies_gained
 
 
 def setup(q):
@@ -204,12 +204,12 @@ def test_energy_balances_while_the_unbalance_force_grows(growth):
         z = np.zeros((2, library.width))
         enter(tables, place, np.zeros(3), 0.8, 0.6, motion, z)
         later = np.exp(exponent * time) * (z[0] + 1j * z[1])
-        held, entries = [], np.zeros((2, 2))
-        for entry, at in zip(entries, (z, np.array([later.real, later.imag])), strict=True):
-            energy_forms(tables.loss, tables.work_re, tables.work_im, first, place, at, entry)
+        held, gained, ends = [], np.zeros(2), (z, np.array([later.real, later.imag]))
+        energies_gained(tables, place, *ends, gained)
+        for at in ends:
             u, v = (shape @ (at[0] + 1j * at[1])).real.reshape(2, n)
             held.append(0.5 * (v @ v + u @ reduced.stiffness @ u))
-        loss, work = entries[1] - entries[0] + tables.steady_power[place] * time
+        loss, work = gained + tables.steady_power[place] * time
         assert held[1] - held[0] == pytest.approx(work - loss, abs=1e-9 * max(abs(held[0]), abs(work)))
 
 

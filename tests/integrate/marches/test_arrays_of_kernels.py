@@ -30,7 +30,7 @@ def arrays_of(value, name):
 def given(monkeypatch):
     """Arrays that the march gives to its kernels, call by call."""
     found = []
-    for name in ("advance", "advance_sections", "advance_pieces"):
+    for name in ("advance", "advance_pieces"):
         kernel = getattr(event_driven, name)
 
         def note(*arguments, kernel=kernel):

@@ -28,7 +28,7 @@ from rubhpc.kernels.contact_modes import (
     find_mode,
 )
 from rubhpc.kernels.coordinate_steps import floor_log2
-from rubhpc.kernels.measuring import energy_forms
+from rubhpc.kernels.measuring import energies_gained
 from rubhpc.study.study import Contact, Integrator
 
 CLEARANCE = np.array([80e-6, 95e-6])
@@ -206,12 +206,6 @@ def read(table, z):
     return table[0].T @ z.real + table[1].T @ z.imag
 
 
-def forms(tables, p, z, entry):
-    """Fill what grows by damping loss and unbalance work, in mode p at the coordinates z."""
-    first = tables.n_eigenmode[p]
-    energy_forms(tables.loss, tables.work_re, tables.work_im, first, p, np.stack([z.real, z.imag]), entry)
-
-
 @pytest.mark.parametrize("mask", MASKS)
 def test_forms_grow_by_the_energy_lost_and_given(case, mask):
     """Powers of damping (with cross-coupled bearings), friction and unbalance, by Gauss's rule on a motion.
@@ -238,11 +232,9 @@ def test_forms_grow_by_the_energy_lost_and_given(case, mask):
     rate, along = case.library.gap_jacobian[closed], case.library.force_direction[closed].T
     force = np.linalg.solve(rate @ along, rate @ (reduced.stiffness @ x + reduced.damping @ v - load))
     lost -= weight @ np.einsum("it,it->t", v, (along - rate.T) @ force)
-    before, after = np.empty(2), np.empty(2)
-    forms(tables, p, z, before)
-    z = z * np.exp(exponent * duration)
-    forms(tables, p, z, after)
-    grown = after - before + tables.steady_power[p] * duration
+    later, grown = z * np.exp(exponent * duration), np.empty(2)
+    energies_gained(tables, p, *(np.stack([at.real, at.imag]) for at in (z, later)), grown)
+    grown += tables.steady_power[p] * duration
     assert grown == pytest.approx([lost, given], rel=1e-6)
 
 
