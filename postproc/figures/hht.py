@@ -17,6 +17,7 @@ from postproc.signals.hilbert_huang import (
     median_frequency,
     span_frequencies,
 )
+from postproc.signals.spectra import default_signal
 from postproc.store.rig_of_case import natural_frequencies, stator_frequencies
 from postproc.store.units import plain_number, scale_of, short_name
 from postproc.store.worst import at_most_loaded_stator
@@ -40,7 +41,7 @@ _SHADE = "0.9"
 
 def hht(
     cases: xr.Dataset,
-    signal: str = "torsion",
+    signal: str | None = None,
     *,
     contact: Literal["masked", "kept"] | None = None,
     revolutions: Count = 4,
@@ -57,10 +58,10 @@ def hht(
     cases
         One case.
     signal
-        Which recorded signal.
+        Which recorded signal [default: torsion].
     contact
         Leave out spans in contact, with windows over the others, or keep them [default: kept for a stator's
-        signals].
+        signals, and where contact was not measured].
     revolutions
         The last ones.
     mode
@@ -69,6 +70,7 @@ def hht(
         End of the ordinate, Hz [default: twice the natural frequency].
     """
     limit = end_of_abscissa(max, orders=False)
+    signal = signal or default_signal(cases, "torsion")
     if signal in cases and "stator" in cases[signal].dims:  # its contacts and natural frequency too
         cases = at_most_loaded_stator(cases)
     shown = hilbert_huang(cases, signal, contact=contact, revolutions=revolutions, n_mode=mode)

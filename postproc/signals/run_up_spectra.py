@@ -123,7 +123,9 @@ def _case(store: xr.Dataset, signals: Sequence[str]) -> tuple[xr.Dataset, int, i
     for signal in signals:
         check_signal(signal, store)
     if not is_run_up(store):
-        raise InputError(f"{source(store)}: its speeds are constant; give a store of a study with [run_up]")
+        raise InputError(
+            f"{source(store)}: its speed is constant; give a run-up, as of a study with [run_up]"
+        )
     data = (narrow(store, [*signals, "speed"]) if "status" in store else store[[*signals, "speed"]]).load()
     per_revolution = round(1.0 / float(data[TURNED][1] - data[TURNED][0]))
     n = int(np.isfinite(data["speed"].values).sum())
