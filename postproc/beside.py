@@ -8,15 +8,15 @@ import numpy as np
 import xarray as xr
 
 from postproc.figures.drawing import Drawing
-from postproc.measured.measured import measured
 from postproc.store.axes import axes_of
 from postproc.store.run_ups import is_run_up
 from postproc.store.select import narrow
+from postproc.store.variables import require_variables
 from rubhpc.errors import InputError
 from rubhpc.schema import AMPLITUDE, DONE, PHASE, TURNED, is_signal
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from matplotlib.axes import Axes
 
@@ -24,13 +24,14 @@ if TYPE_CHECKING:
 
 ORIGIN = "motion"  # the axis of what is simulated and what is measured
 _ORIGINS = ("simulated", "measured")
+_OF_RUN_UPS, _OF_CASES = ("speed", "time"), ("spin_speed", "period")
 _PAGE = 180.0  # mm, the width of two figures
 
 
 def figure_beside(
-    figure: Figure, cases: xr.Dataset, path: str, words: Mapping[str, Any], *, has_data: bool = False
+    figure: Figure, cases: xr.Dataset, found: xr.Dataset, words: Mapping[str, Any], *, has_data: bool = False
 ) -> Drawing:
-    """Return the drawing of some cases and of a measured file; `has_data`: its data are written too.
+    """Return the drawing of some cases and of what was measured; `has_data`: its data are written too.
 
     One case at a constant speed and a record of that kind, or two run-ups, are drawn over one another where
     the figure has the option `over`.
@@ -40,14 +41,14 @@ def figure_beside(
     InputError
         The figure cannot be drawn of one of the two.
     """
-    found = measured(path, samples_per_revolution=_samples_of(cases))
     signals = [str(name) for name in found.data_vars if is_signal(str(name)) and name in cases]
     if not signals:
         theirs = ", ".join(str(name) for name in found.data_vars if is_signal(str(name)))
         raise InputError(f"--measured: {theirs}: the store has no signal of that name; name one as there")
-    if "signal" in figure.options and not words.get("signal") and not words.get("full"):
-        is_many = figure.options["signal"].form == "many"
-        words = {**words, "signal": tuple(signals) if is_many else signals[0]}
+    given = words.get("signal") or ()
+    require_variables(found, (given,) if isinstance(given, str) else given)
+    if "signal" in figure.options and not given and not words.get("full"):
+        words = {**words, "signal": tuple(signals) if figure.name == "waveform" else signals[0]}
     if (
         "over" in figure.options
         and is_run_up(cases) == is_run_up(found)
@@ -63,8 +64,8 @@ def figure_beside(
     return _next_to(figure.of(cases, **words), figure.of(found, **words))
 
 
-def _samples_of(cases: xr.Dataset) -> int:
-    """Samples a revolution of the cases, to which the measured signals are resampled."""
+def samples_of(cases: xr.Dataset) -> int:
+    """Return the samples a revolution of some cases, to which measured signals are to be resampled."""
     name = TURNED if TURNED in cases.coords else "revolution"
     if name not in cases.coords or "sample" not in cases[name].dims:
         raise InputError("--measured: this store has no waveforms; draw the measured file by itself")
@@ -77,48 +78,31 @@ def _is_one(cases: xr.Dataset) -> bool:
 
 
 def together(cases: xr.Dataset, found: xr.Dataset, signals: Sequence[str]) -> xr.Dataset:
-    """Return the signals that one case and a measured record share, along the axis `motion`."""
-    if is_run_up(cases):
-        names = ["speed", "time", *signals]
-        names += [p + name for p in (AMPLITUDE, PHASE) for name in signals if p + name in cases]
-        lengths = {dim: max(cases.sizes[dim], found.sizes[dim]) for dim in ("sample", "revolution")}
-        rows = [_padded(one, lengths) for one in (_one(cases, names), found[names])]
-    else:
-        names = [*signals, "spin_speed", *(name for name in ("period",) if name in cases)]
-        least = min(cases.sizes["sample"], found.sizes["sample"])
-        rows = [one.isel(sample=slice(-least, None)) for one in (_one(cases, names), found[names])]
-        rows = [
-            one.assign_coords(revolution=rows[0]["revolution"] - rows[0]["revolution"][0]) for one in rows
-        ]
-    rows = [one.drop_vars([n for n, at in one.coords.items() if not at.dims]) for one in rows]
-    both = xr.concat(
-        rows, ORIGIN, combine_attrs="override", coords="minimal", compat="override", join="override"
-    )
-    both = both.transpose(ORIGIN, ...)
+    """Return the signals that one case and a measured record share, along the axis `motion`.
+
+    A run-up has NaN beyond its end, as in a store; at a constant speed both have as many revolutions.
+    """
+    names = [*signals, *(name for name in (*_OF_RUN_UPS, *_OF_CASES) if name in cases and name in found)]
+    names += [what + name for what in (AMPLITUDE, PHASE) for name in signals if what + name in cases]
+    rows = [(narrow(one, names) if "status" in one else one[names]).load() for one in (cases, found)]
+    if not is_run_up(cases):
+        least = min(one.sizes["sample"] for one in rows)
+        rows = [one.isel(sample=slice(-least, None)) for one in rows]
+    of_samples = TURNED if is_run_up(cases) else "revolution"
+    longest = max(rows, key=lambda one: one.sizes["sample"])[of_samples]
+    rows = [one.drop_vars([n for n, at in one.coords.items() if n not in one.dims]) for one in rows]
+    rows = [one.assign_coords(sample=np.arange(one.sizes["sample"])) for one in rows]
+    both = xr.concat(rows, ORIGIN, join="outer", combine_attrs="override").drop_vars("sample")
     about = {"flag_meanings": " ".join(_ORIGINS), "units": "1"}
-    both = both.assign_coords({ORIGIN: (ORIGIN, np.arange(2), about)})
+    both = both.transpose(ORIGIN, ...).assign_coords({ORIGIN: (ORIGIN, np.arange(2), about)})
+    both[of_samples] = "sample", longest.values - longest.values[0], longest.attrs
+    both = both.set_coords(of_samples)
     both["status"] = ORIGIN, np.full(2, DONE, dtype=np.int8)
     if "clearance" in cases:
         both["clearance"] = cases["clearance"].squeeze(drop=True)
     both.attrs = dict(cases.attrs)
     both.encoding["source"] = cases.encoding.get("source", "this store")
     return both
-
-
-def _one(cases: xr.Dataset, names: Iterable[str]) -> xr.Dataset:
-    return (narrow(cases, names) if "status" in cases else cases[list(names)]).load()
-
-
-def _padded(one: xr.Dataset, lengths: Mapping[str, int]) -> xr.Dataset:
-    """A run-up with NaN beyond its end, as a store has them."""
-    own, n = one.drop_vars([TURNED, "revolution"]), _samples_of(one)
-    padded = own.pad({dim: (0, length - own.sizes[dim]) for dim, length in lengths.items()})
-    return padded.assign_coords(
-        {
-            TURNED: ("sample", np.arange(lengths["sample"]) / n, one[TURNED].attrs),
-            "revolution": np.arange(lengths["revolution"]),
-        }
-    )
 
 
 def _next_to(left: Drawing, right: Drawing) -> Drawing:

@@ -48,8 +48,9 @@ def centreline(
     """
     cases = moved_at(cases, probes, node, stator)
     shown = mean_positions(cases, ["vertical", "horizontal"])
-    where = "the probes" if MEASURED in cases.attrs else "the disc"
-    where = str(cases["vertical"].attrs.get("place", where)).removeprefix("motion at ")
+    _, is_named, where = str(cases["vertical"].attrs.get("place", "")).partition("motion at ")
+    if not is_named:
+        where = "the probes" if MEASURED in cases.attrs else "the disc"
     clearance = _clearance(cases)
     return Drawing(
         shown=shown, draw=lambda axes: draw_centreline(shown, axes[0], where, clearance), height=85

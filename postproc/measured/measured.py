@@ -11,15 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from postproc.measured.clock import Sampled, clipped, runs, sampled
-from postproc.measured.formats import FORMATS, read_columns
-from postproc.measured.keys import MeasuredKeys, Signal, build_keys, read_keys, unit_factor
-from postproc.measured.shaft import Turning, at_constant_speed, by_key_phasor, by_speed_column
-from postproc.measured.tracking import by_angle
+from postproc.measured.formats import FORMATS
+from postproc.measured.keys import build_keys, read_keys
+from postproc.measured.record import read_record
 from postproc.signals.places import seen_by_two
 from postproc.store.attributes import MEASURED
 from rubhpc.errors import InputError
-from rubhpc.input.messages import place
 from rubhpc.integrate.measuring.orbit_measures import period
 from rubhpc.rig.reading import read_rig
 from rubhpc.schema import AMPLITUDE, DONE, ORDERS, PHASE, PROBE, TURNED, VARIABLES, run_up_variables
@@ -28,18 +25,12 @@ from rubhpc.spectra import track_orders
 if TYPE_CHECKING:
     from os import PathLike
 
-    from numpy.typing import NDArray
+    from postproc.measured.keys import MeasuredKeys, Signal
+    from postproc.measured.record import Record
 
-    Floats = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
-
-_ONE_SPEED = 0.02  # by which the speed of revolutions varies about their mean, at one speed
-_GAP = 0.05  # of a revolution: more samples that are missing in a row cut the record
-_FEWEST = 4  # whole revolutions
-_START = 6  # revolutions of a run-up, whose mean position is 0 where no gap voltage is given
+_ACROSS = 0.05  # least sine of the angle between two probes that see a motion
 _WINDOW = 6  # revolutions over which orders are followed, as in a simulated run-up
 _PLAIN_ORDERS = 8  # up to which an orbit is compared with itself: above is noise, for the most part
-_RPM = 30.0 / math.pi
 
 
 def measured(
@@ -87,6 +78,10 @@ def measured(
     >>> found.rub.spectrum("vertical")  # doctest: +SKIP
     """
     path = Path(file)
+    if path.is_dir() or path.suffix.lower() not in (".toml", *FORMATS):
+        raise InputError(
+            f"{path}: is no measured file; give a .toml, or convert it to one of {', '.join(FORMATS)}"
+        )
     described = path if path.suffix.lower() == ".toml" else path.with_suffix(".toml")
     tables = read_keys(described) if described == path or described.is_file() else {}
     if path.suffix.lower() != ".toml":
@@ -117,54 +112,43 @@ def _beside(path: Path) -> list[str]:
 
 def _one(keys: MeasuredKeys, path: Path) -> xr.Dataset:
     """The dataset of one file."""
-    turned, speed, begins, notes = _by_revolution(keys, path)
-    n = keys.samples_per_revolution
-    is_steady = float(np.ptp(_smooth(speed))) <= _ONE_SPEED * float(speed.mean())
-    turned = {signal: _zeroed(values, signal, is_steady, n) for signal, values in turned.items()}
-    if keys.slow_roll:
-        turned = _without_run_out(keys, path, turned, speed)
+    record, n = read_record(keys, path), keys.samples_per_revolution
     variables: dict[str, Any] = {
         signal.name: ("sample", values, {**signal.about, "place": _place(signal, path)})
-        for signal, values in turned.items()
+        for signal, values in record.signals.items()
     }
-    at = np.arange(speed.size * n) / n
+    at = np.arange(record.speed.size * n) / n
     coords: dict[str, Any] = {}
-    if is_steady:
+    if record.is_steady:
         coords["revolution"] = "sample", at, {"units": "1", "long_name": "revolution"}
-        own = VARIABLES["spin_speed"]
-        mean = speed.size * 2.0 * math.pi / (begins[-1] - begins[0])
-        variables["spin_speed"] = (), mean, {"units": own.unit, "long_name": own.long_name}
+        mean = record.speed.size * 2.0 * math.pi / (record.begins[-1] - record.begins[0])
+        variables["spin_speed"] = (), mean, {"units": "rad s-1", "long_name": "spin speed"}
     else:
         coords[TURNED] = "sample", at, {"units": "1", "long_name": "revolutions turned"}
-        variables |= _revolutions(variables, n, speed, begins)
-        coords["revolution"] = np.arange(speed.size)
-        coords["order"] = (
-            "order",
-            np.array(ORDERS),
-            {"units": "1", "long_name": "order of the spin frequency"},
-        )
+        variables |= _revolutions(variables, n, record)
+        coords["revolution"] = np.arange(record.speed.size)
+        about = {"units": "1", "long_name": "order of the spin frequency"}
+        coords["order"] = "order", np.array(ORDERS), about
     probes = [dict(signal.probe) for signal in keys.signals if signal.probe]
     found = xr.Dataset(variables, coords=coords, attrs={"study": {"record": {"probe": probes}}})
-    found.attrs |= {MEASURED: str(path), "note": "\n".join(notes)}
+    found.attrs |= {MEASURED: str(path), "note": "\n".join(record.notes)}
     if keys.rig is not None:
         found.attrs["rig"] = read_rig(_rig_path(keys)).as_dict()
     found = _with_orbit(found, keys, probes)
-    if is_steady:
-        own = VARIABLES["period"]
-        found["period"] = (), _period(found, n), {"units": "1", "long_name": own.long_name}
+    if record.is_steady:
+        about = {"units": "1", "long_name": VARIABLES["period"].long_name}
+        found["period"] = (), _period(found, n), about
     elif "vertical" in found and AMPLITUDE + "vertical" not in found:
         moved = {
             name: ("sample", found[name].values, found[name].attrs) for name in ("vertical", "horizontal")
         }
-        found = found.assign(_revolutions(moved, n, speed, begins))
+        found = found.assign(_revolutions(moved, n, record))
     return found
 
 
 def _place(signal: Signal, path: Path) -> str:
     """Where a signal was measured, for captions."""
-    angle = f" at {math.degrees(signal.probe['angle']):.4g}\N{DEGREE SIGN}" if signal.probe else ""
-    node = "" if signal.node is None else f"node {signal.node}{angle} in "
-    return f"measured{angle if not node else ''}: {node}{path.name}"
+    return f"measured: {'' if signal.node is None else f'node {signal.node} in '}{path.name}"
 
 
 def _rig_path(keys: MeasuredKeys) -> str:
@@ -173,131 +157,12 @@ def _rig_path(keys: MeasuredKeys) -> str:
     return str(near) if near.is_file() else str(keys.rig)
 
 
-def _by_revolution(keys: MeasuredKeys, path: Path) -> tuple[dict[Signal, Floats], Floats, Floats, list[str]]:
-    """Signals at uniform angles, the speed (rad/s) of each revolution, their ends (s), and what is wrong."""
-    record, turning = _read(keys, path)
-    notes = [*record.notes, *turning.notes]
-    for signal in keys.signals:
-        raw = record.values[signal.column]
-        if not np.ptp(raw):
-            notes.append(f"column {signal.column}: is {raw[0]:g} throughout; check the sensor")
-        share, levels = clipped(raw)
-        if levels:
-            ends = " and ".join(f"{level:.4g}" for level in levels)
-            notes.append(
-                f"column {signal.column}: {100 * share:.2g} % of the samples are clipped, at {ends}; "
-                "amplitudes are too low, raise the range"
-            )
-    first, end = math.ceil(turning.first - 1e-9), math.floor(turning.last + 1e-9)
-    if end - first < _FEWEST:
-        problem = f"holds {max(end - first, 0)} whole revolutions, fewer than {_FEWEST}"
-        raise InputError(f"{path}: {problem}; give a longer record, or check [time] and [speed]")
-    begins = turning.time_at(np.arange(first, end + 1).astype(float))
-    begins = np.clip(begins, 0.0, record.time[-1])
-    if not (np.diff(begins) > 0.0).all():
-        raise InputError(f"{path}: [speed]: the shaft does not turn forward throughout; check the column")
-    low, high = _longest_part(keys, record, begins)
-    if (low, high) != (0, begins.size - 1):
-        kept = f"{begins[low]:.3f} to {begins[high]:.3f} s, {high - low} of {begins.size - 1} revolutions"
-        notes.append(f"drop-outs: only the longest part without them is used, {kept}")
-    if high - low < _FEWEST:
-        raise InputError(f"{path}: drop-outs leave no {_FEWEST} revolutions in a row; give another record")
-    n, begins = keys.samples_per_revolution, begins[low : high + 1]
-    rows = {
-        signal: by_angle(record.values[signal.column], record.step, turning, first + low, first + high, n)
-        for signal in keys.signals
-    }
-    return rows, 2.0 * math.pi / np.diff(begins), begins, [f"{path.name}: {note}" for note in notes]
-
-
-def _read(keys: MeasuredKeys, path: Path) -> tuple[Sampled, Turning]:
-    """The columns of a file at uniform times, and how the shaft turned."""
-    assert keys.speed is not None
-    of_time, of_speed = keys.time.column, keys.speed.column
-    names = [signal.column for signal in keys.signals] + [name for name in (of_time, of_speed) if name]
-    columns, rate = read_columns(path, names)
-    if path.suffix.lower() == ".wav":
-        columns = {name: values * keys.full_scale for name, values in columns.items()}
-    rate = rate if keys.time.rate is None else keys.time.rate
-    time = None
-    if of_time is not None:
-        where = place(keys.file, "time", "unit")
-        time = columns.pop(of_time) * unit_factor(keys.time.unit, "s", where)
-    elif rate is None:
-        fix = 'add [time] with column = "t" or rate = "25.6 kHz"'
-        raise InputError(f"{keys.file}: [time]: {path.suffix} states no sampling rate; {fix}")
-    record = sampled(columns, time, rate, str(path), of_time or "")
-    if of_speed is None:
-        turning = at_constant_speed(float(keys.speed.value or 0.0), float(record.time[-1]))
-    elif keys.speed.is_key_phasor:
-        turning = by_key_phasor(
-            record.values[of_speed], record.step, keys.speed, f"{path}: column {of_speed}"
-        )
-    else:
-        where = place(keys.file, "speed", "unit")
-        factor = unit_factor(str(keys.speed.unit), "rad/s", where)
-        turning = by_speed_column(factor * record.values[of_speed], record.step, f"{path}: column {of_speed}")
-    return record, turning
-
-
-def _longest_part(keys: MeasuredKeys, record: Sampled, begins: Floats) -> tuple[int, int]:
-    """The longest part, as revolutions from and to, in which no signal lacks a twentieth of a revolution."""
-    bad = np.zeros(begins.size - 1, dtype=bool)
-    lasts = np.diff(begins)
-    for column in {signal.column for signal in keys.signals}:
-        first, end = (at * record.step for at in runs(record.absent[column]))
-        held = [np.clip(np.searchsorted(begins, at) - 1, 0, bad.size - 1) for at in (first, end)]
-        for is_long, start, stop in zip(end - first > _GAP * lasts[held[0]], *held, strict=True):
-            if is_long:
-                bad[start : stop + 1] = True
-    parts = [(int(first), int(end)) for first, end in zip(*runs(~bad), strict=True)]
-    return max(parts, key=lambda part: part[1] - part[0], default=(0, 0))
-
-
-def _smooth(speed: Floats) -> Floats:
-    """Speeds without the scatter of single pulses: means over eight revolutions."""
-    width = min(8, speed.size)
-    return np.convolve(speed, np.full(width, 1.0 / width), mode="valid")
-
-
-def _zeroed(values: Floats, signal: Signal, is_steady: bool, n: int) -> Floats:
-    """A signal in SI, with the position 0 at its gap voltage, or else at its mean."""
-    offset = signal.offset
-    if offset is None:
-        offset = float((values if is_steady else values[: _START * n]).mean())
-    return (values - offset) * signal.factor
-
-
-def _without_run_out(
-    keys: MeasuredKeys, path: Path, turned: dict[Signal, Floats], speed: Floats
-) -> dict[Signal, Floats]:
-    """Signals less the mean revolution at slow roll, whose own mean is kept."""
-    assert keys.slow_roll is not None
-    n = keys.samples_per_revolution
-    if keys.slow_roll.data is not None:
-        slow, *_ = _by_revolution(keys, Path(keys.file).parent / keys.slow_roll.data)
-        slow = {signal: values * signal.factor for signal, values in slow.items()}
-        picked = np.ones(next(iter(slow.values())).size // n, dtype=bool)
-    else:
-        slow, picked = turned, speed < float(keys.slow_roll.below or 0.0)
-    if not picked.any():
-        lowest = f"{_RPM * float(speed.min()):.4g} rpm"
-        raise InputError(
-            f"{path}: [slow_roll] below: the lowest speed is {lowest}; give one above it, or data"
-        )
-    found = {}
-    for signal, values in turned.items():
-        mean = slow[signal].reshape(-1, n)[picked].mean(axis=0)
-        found[signal] = values - np.tile(mean - mean.mean(), values.size // n)
-    return found
-
-
-def _revolutions(signals: Mapping[str, Any], n: int, speed: Floats, begins: Floats) -> dict[str, Any]:
+def _revolutions(signals: Mapping[str, Any], n: int, record: Record) -> dict[str, Any]:
     """What a run-up has of every revolution: speed, time, and amplitude and phase of orders."""
     names = [(name.removeprefix(PROBE), "displacement") for name in signals if name.startswith(PROBE)]
     own = run_up_variables(names)
     found: dict[str, Any] = {}
-    for name, values in (("speed", speed), ("time", begins[:-1])):
+    for name, values in (("speed", record.speed), ("time", record.begins[:-1])):
         about = own[f"revolution_{name}"]
         found[name] = "revolution", values, {"units": about.unit, "long_name": about.long_name}
     for name, (_, values, about) in signals.items():
@@ -315,10 +180,8 @@ def _with_orbit(found: xr.Dataset, keys: MeasuredKeys, probes: list[dict[str, An
         return found if node is None else found.assign_attrs(node=node)
     seen = [probe for probe in probes if probe["quantity"] == "displacement"]
     for first, second in combinations(seen, 2):
-        if (
-            all(first.get(key) == second.get(key) for key in ("node", "stator"))
-            and abs(math.sin(second["angle"] - first["angle"])) > _GAP
-        ):
+        is_one_place = all(first.get(key) == second.get(key) for key in ("node", "stator"))
+        if is_one_place and abs(math.sin(second["angle"] - first["angle"])) > _ACROSS:
             return seen_by_two(found, first, second)
     return found
 
@@ -355,10 +218,10 @@ def _along_speeds(each: Sequence[xr.Dataset], path: Path) -> xr.Dataset:
     speeds = [float(one["spin_speed"]) for one in each]
     if min(np.diff(speeds)) <= 0.0:
         raise InputError(f"{path}: data: two files have one speed; leave out one of them")
+    found = xr.concat(rows, "speed", combine_attrs="override", coords="minimal", compat="override")
+    for values in found.data_vars.values():
+        values.attrs |= {"place": f"measured: {path.name}"} if "place" in values.attrs else {}
     about = {"units": "rad s-1", "long_name": "spin speed"}
-    found = xr.concat(
-        rows, "speed", combine_attrs="override", coords="minimal", compat="override", join="override"
-    )
     found = found.assign_coords(speed=("speed", speeds, about))
     found["status"] = "speed", np.full(len(each), DONE, dtype=np.int8)
     found.attrs["note"] = "\n".join(one.attrs["note"] for one in each if one.attrs["note"])

@@ -144,7 +144,7 @@ def spectrum_data(store: xr.Dataset, signal: str, over: str | None = None) -> xr
     spread = [find_axis(store, over)] if over else []
     spectrum, data = periodic_spectrum(store, signal, spread)
     period = proven_period(store, spread)
-    if period is not None:
+    if period is not None and bool((period > 0).any()):
         spectrum = spectrum.assign_coords(period=period)
     return with_frequency(spectrum, data["spin_speed"].compute())
 

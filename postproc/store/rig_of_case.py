@@ -37,7 +37,12 @@ def rig_of(case: xr.Dataset, values: Mapping[str, float] | None = None) -> Rig:
     """
     table = table_of(case, "rig")
     if not table:
-        raise InputError(f"{source(case)}: contains no rig; give a store that rubhpc has written")
+        fix = (
+            "add rig to the measured file"
+            if MEASURED in case.attrs
+            else "give a store that rubhpc has written"
+        )
+        raise InputError(f"{source(case)}: contains no rig; {fix}")
     rig = rig_from_dict(table, f"{source(case)}: rig")
     chosen = {
         str(n): float(c.values.item())

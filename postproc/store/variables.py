@@ -75,6 +75,9 @@ def probe_of(store: xr.Dataset, name: str) -> dict[str, Any]:
     known = probes_of(store)
     name = name.removeprefix(PROBE)
     if name not in known:
-        fix = f"choose one of {', '.join(known)}" if known else "run the study with a [[record.probe]]"
+        fix = (
+            "run the study with a [[record.probe]]" if MEASURED not in store.attrs else f"add [signal.{name}]"
+        )
+        fix = f"choose one of {', '.join(known)}" if known else fix
         raise InputError(f"{source(store)}: no probe {name}; {fix}")
     return known[name]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from rubhpc.commands.selection import SELECT, open_cases, pairs
+from rubhpc.commands.selection import SELECT, measurement, open_cases, pairs
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -72,7 +72,7 @@ def draw(
     beside: str | None = None,
 ) -> None:
     """Draw and save a figure, write its data where asked, and print its lines and the paths of all files."""
-    from postproc.beside import figure_beside
+    from postproc.beside import figure_beside, samples_of
     from postproc.figures.style import check_figure_path
     from postproc.store.export import check_data_path, write_data
 
@@ -82,7 +82,8 @@ def draw(
     if beside is None:
         drawing = figure.of(cases, **words)
     else:
-        drawing = figure_beside(figure, cases, beside, words, has_data=data_path is not None)
+        found = measurement(beside, samples_per_revolution=samples_of(cases))
+        drawing = figure_beside(figure, cases, found, words, has_data=data_path is not None)
     for line in drawing.lines:
         click.echo(line)
     click.echo(str(drawing.save(path)))

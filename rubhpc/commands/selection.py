@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -38,11 +38,11 @@ def is_measurement(path: str) -> bool:
     return not Path(path).is_dir() and Path(path).suffix.lower() in (".toml", *FORMATS)
 
 
-def measurement(path: str) -> xr.Dataset:
+def measurement(path: str, **keys: Any) -> xr.Dataset:
     """Return the dataset of a measured file, and print what is wrong with the record on stderr."""
     from postproc.measured.measured import measured
 
-    found = measured(path)
+    found = measured(path, **keys)
     for note in filter(None, found.attrs["note"].split("\n")):
         click.echo(f"note: {note}", err=True)
     return found

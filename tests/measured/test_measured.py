@@ -113,6 +113,9 @@ def test_a_run_up_is_tracked_and_its_run_out_subtracted(folder):
     seen = seen.values
     # A logic pulse is placed to a third of a sample, 1 % of the phase at 30 Hz.
     assert np.abs(seen - true)[6:-6].max() < 0.02 * np.abs(true).max()
+    (folder / "slow.csv").write_text(path.read_text())
+    of_file = read(path, slow_roll={"data": "slow.csv"})  # the mean of all revolutions, resonance included
+    assert float(abs(of_file["amplitude_vertical"] - without["amplitude_vertical"]).max()) > 1e-5
     early = with_run_out["amplitude_vertical"].sel(order=1).values[2]
     assert early > 12e-6 > abs(seen[2])
 
@@ -292,7 +295,7 @@ def test_bad_input_is_refused_in_one_line(folder, columns, keys, message):
         ("a.h5", b"junk" * 99, "cannot be read as .h5"),
         ("a.uff", b"junk" * 99, "contains no data set 58"),
         ("a.wav", b"junk" * 99, "cannot be read as .wav"),
-        ("a.xlsx", b"junk", "unknown format; convert it to one of .csv"),
+        ("a.xlsx", b"junk", "is no measured file; give a .toml, or convert it to one of .csv"),
         ("b.csv", None, "no such file; check the path"),
     ],
 )

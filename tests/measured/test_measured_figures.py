@@ -40,6 +40,8 @@ def files(tmp_path_factory):
     data_logger.write(folder / "slow.csv", slow | {"t": 1.5 * slow["t"]})
     for name in ("probe", "up"):
         (folder / f"{name}.toml").write_text(TABLES)
+    at_node = TABLES.replace("[signal.horizontal]", "node = 8\n[signal.horizontal]")
+    (folder / "rigged.toml").write_text('data = "probe.csv"\nrig = "mokhtar2017"\n' + at_node)
     (folder / "both.toml").write_text('data = ["slow.csv", "probe.csv"]\n' + TABLES)
     return folder
 
@@ -62,6 +64,8 @@ def run(files, monkeypatch):
         ("orbit", ["probe.csv", "--revolutions", 4]),
         ("spectrum", ["probe.toml", "--full", "--orders"]),
         ("hht", ["probe.toml", "--mode", 2]),
+        ("orbit", ["rigged.toml", "--node", 8]),
+        ("hht", ["rigged.toml", "--mode", 2]),
         ("cascade", ["both.toml"]),
         ("bode", ["both.toml", "--signal", "vertical", "--signal", "horizontal"]),
         ("waveform", ["up.toml", "--at", "1500 rpm"]),
@@ -138,6 +142,14 @@ def test_figures_that_cannot_share_their_axes_are_next_to_one_another(run):
             "torsion: was not measured; there are vertical, hor",
         ),
         ("orbit", ["probe.csv", "--node", 3], "node 3: its motion is not recorded; leave it out"),
+        ("waterfall", ["up.csv", "--signal", "probe_x"], "probe_x: was not measured; there are vertical"),
+        ("orbit", ["probe.csv", "--stator", 1], "contains no rig; add rig to the measured file"),
+        ("orbit", ["study.zarr", *CHOSEN, "--measured", "study.zarr"], "study.zarr: is no measured file"),
+        (
+            "waveform",
+            ["study.zarr", *CHOSEN, "--signal", "torsion", "--measured", "probe.csv"],
+            "probe.csv: torsion: was not measured",
+        ),
         ("map", ["probe.csv"], "a map needs two axes of several values; there is none"),
         ("orbit", ["nothing.csv"], "nothing.csv: "),
         (
