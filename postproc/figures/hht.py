@@ -18,6 +18,7 @@ from postproc.signals.hilbert_huang import (
     span_frequencies,
 )
 from postproc.signals.spectra import default_signal
+from postproc.store.attributes import MEASURED
 from postproc.store.rig_of_case import natural_frequencies, stator_frequencies
 from postproc.store.units import plain_number, scale_of, short_name
 from postproc.store.worst import at_most_loaded_stator
@@ -224,7 +225,9 @@ def _medians(shown: xr.Dataset, mode: int) -> Iterator[str]:
             yield f"median frequency {where} {touching:.2f} Hz; no span out of contact oscillates"
         return
     each = ", ".join(f"{f:.1f}" for f in span_frequencies(shown, mode).dropna("span").values)
-    yield f"median frequency out of contact {middle:.2f} Hz (span by span: {each})"
+    is_unknown = MEASURED in shown.attrs and not shown["contact"].any()
+    where = "" if is_unknown else " out of contact"
+    yield f"median frequency{where} {middle:.2f} Hz (span by span: {each})"
     spread = {str(name): float(width) for name, width in contact_bandwidth(shown, mode).items()}
     if math.isfinite(spread["contact"]):
         yield f"interquartile spread {spread['contact']:.0f} Hz in contact, {spread['free']:.0f} Hz free"

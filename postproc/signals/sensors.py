@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 from scipy.interpolate import CubicSpline
+from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from postproc.signals.resampling import between, decimated
 from postproc.signals.spectra import check_signal, samples_per_revolution
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
 _LEAST_OVERSAMPLING = 2  # times the rate, at which signals are filtered before the clock samples them
 _STEEP = 4  # order of the Butterworth filter of a sensor's band
+_FEWEST = 16  # samples
 PULSE = 5.0  # V, height of the key-phasor's pulses
 _PULSE_WIDTH = 10.0  # degrees of a turn
 
@@ -69,61 +71,54 @@ class Sensor:
     drop_out_length: float = 1.0
 
     def __post_init__(self) -> None:
-        for name in ("white", "pink", "band", "full_scale", "step", "drop_outs", "drop_out_length"):
-            value = getattr(self, name)
-            if value is not None and not 0.0 <= value < math.inf:
-                raise InputError(f"sensor: {name}: {value} is out of range; give one of at least 0")
-        if self.drop_outs >= 1.0 or self.drop_out_length < 1.0:
-            raise InputError("sensor: drop_outs is a share below 1, drop_out_length at least one sample")
+        for name in ("white", "pink", "step", "drop_outs"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise InputError(f"sensor: {name}: {getattr(self, name)} is out of range; give 0 or more")
+        for name in ("band", "full_scale"):
+            if (value := getattr(self, name)) is not None and not value > 0.0:
+                raise InputError(f"sensor: {name}: {value} is out of range; give one above 0, or None")
+        length = self.drop_out_length
+        if not length >= 1.0 or self.drop_outs * (1.0 + length) > length:  # a sample at least between two
+            problem = f"{self.drop_outs} of the samples cannot be lost {length} in a row"
+            raise InputError(
+                f"sensor: drop_outs: {problem}; give a smaller share, or a drop_out_length above 1"
+            )
 
     def before_clock(self, values: Floats, turns: Floats, rate: float) -> Floats:
-        """Return what reaches the converter of a signal (..., n_sample), sampled at `rate`, Hz."""
-        from scipy.signal import butter, sosfilt, sosfilt_zi
-
+        """Return what reaches the converter of a signal (n_sample,), at `rate` hertz and shaft turns."""
         seen = values + self.offset
         for order, amplitude, phase in self.run_out:
             seen = seen + amplitude * np.cos(2.0 * math.pi * order * turns + phase)
         if self.band is None or self.band >= 0.5 * rate:
             return seen
         sections = butter(_STEEP, self.band, fs=rate, output="sos")
-        start = sosfilt_zi(sections).reshape(-1, *[1] * (seen.ndim - 1), 2) * seen[..., :1]
-        return np.asarray(sosfilt(sections, seen, zi=start)[0])
+        return np.asarray(sosfilt(sections, seen, zi=sosfilt_zi(sections) * seen[0])[0])
 
     def after_clock(self, values: Floats, rng: np.random.Generator) -> Floats:
-        """Return what the converter gives of a signal (..., n_sample): noise, limits, steps and losses."""
-        found = values + self.noise(values.shape, rng)
+        """Return what the converter gives of a signal (n_sample,): noise, limits, steps and losses."""
+        found = values + self.white * rng.standard_normal(values.size)
+        if self.pink:
+            power = np.append(0.0, 1.0 / np.arange(1, values.size // 2 + 1))
+            lines = rng.standard_normal((power.size, 2)) @ (1.0, 1j) * np.sqrt(power / (4.0 * power.sum()))
+            found += self.pink * values.size * np.fft.irfft(lines, values.size)
         if self.full_scale is not None:
             found = np.clip(found, -self.full_scale, self.full_scale)
         if self.step:
             found = self.step * np.rint(found / self.step)
         if self.drop_outs:
-            found = np.where(self._lost(values.shape, rng), math.nan, found)
+            found[self._lost(values.size, rng)] = math.nan
         return found
 
-    def noise(self, shape: tuple[int, ...], rng: np.random.Generator) -> Floats:
-        """Return white and 1/f noise (..., n_sample)."""
-        found = self.white * rng.standard_normal(shape)
-        if self.pink:
-            n_line = shape[-1] // 2 + 1
-            lines = rng.standard_normal((*shape[:-1], n_line)) + 1j * rng.standard_normal(
-                (*shape[:-1], n_line)
-            )
-            power = np.concatenate([[0.0], 1.0 / np.arange(1, n_line)])
-            lines *= np.sqrt(power / (4.0 * power.sum())) * shape[-1]
-            found += self.pink * np.fft.irfft(lines, shape[-1], axis=-1)
-        return found
-
-    def _lost(self, shape: tuple[int, ...], rng: np.random.Generator) -> NDArray[np.bool_]:
+    def _lost(self, n_sample: int, rng: np.random.Generator) -> NDArray[np.bool_]:
         """Return which samples are lost: runs and spans between them of random lengths (a Markov chain)."""
-        begins = self.drop_outs / ((1.0 - self.drop_outs) * self.drop_out_length)
-        flat = np.zeros((math.prod(shape[:-1]), shape[-1]), dtype=bool)
-        for row in flat:
-            at = int(rng.geometric(begins)) - 1
-            while at < row.size:
-                length = int(rng.geometric(1.0 / self.drop_out_length))
-                row[at : at + length] = True
-                at += length + int(rng.geometric(begins))
-        return flat.reshape(shape)
+        begins = min(1.0, self.drop_outs / ((1.0 - self.drop_outs) * self.drop_out_length))
+        lost = np.zeros(n_sample, dtype=bool)
+        at = int(rng.geometric(begins)) - 1
+        while at < n_sample:
+            end = at + int(rng.geometric(1.0 / self.drop_out_length))
+            lost[at:end] = True
+            at = end + int(rng.geometric(begins))
+        return lost
 
 
 def sense(
@@ -164,7 +159,11 @@ def sense(
     for name in sensors:
         check_signal(name, case)
     turns_at, duration, per_revolution = _turning(case)
-    data = (narrow(case, list(sensors)) if "status" in case else case[list(sensors)]).load()
+    if duration * rate < _FEWEST:
+        raise InputError(
+            f"rate: {rate:g} Hz gives {int(duration * rate)} samples of {duration:.3g} s; raise it"
+        )
+    data = narrow(case, list(sensors)).load()
     highest = (
         per_revolution
         * float(np.gradient(turns_at(np.linspace(0.0, duration, 1000))).max())
@@ -203,7 +202,7 @@ def _turning(case: xr.Dataset) -> tuple[Any, float, int]:
         data = narrow(case, ["spin_speed"])
         n, rate = samples_per_revolution(case["revolution"]), float(data["spin_speed"]) / (2.0 * math.pi)
         return (lambda time: time * rate), case.sizes["sample"] / (n * rate), n
-    turning = (narrow(case, ["speed", "time"]) if "status" in case else case[["speed", "time"]]).load()
+    turning = narrow(case, ["speed", "time"]).load()
     turning = turning.isel(revolution=np.isfinite(turning["speed"].values))
     speeds, begins = turning["speed"].values, turning["time"].values
     ends = np.append(begins, begins[-1] + 2.0 * math.pi / speeds[-1]) - begins[0]

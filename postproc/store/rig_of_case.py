@@ -124,7 +124,7 @@ def _over_rig(
 
 def has_place(case: xr.Dataset) -> bool:
     """Whether it is known at which node the motion is: what was measured may not say."""
-    return "node" in case.attrs or "rig" in case.attrs
+    return isinstance(case.attrs.get("node"), int) or "rig" in case.attrs
 
 
 def recorded_node(case: xr.Dataset) -> int:
@@ -132,8 +132,8 @@ def recorded_node(case: xr.Dataset) -> int:
 
     There it is recorded at the first stator, unless the rotor names another node.
     """
-    if "node" in case.attrs:
-        return int(case.attrs["node"])
+    if isinstance(node := case.attrs.get("node"), int):
+        return node
     rig = rig_of(case)
     return rig.rotor.recorded_node([stator.node for stator in rig.stator])
 

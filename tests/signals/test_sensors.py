@@ -112,7 +112,9 @@ def test_the_key_phasor_pulses_once_a_revolution_where_the_mark_passes():
     [
         ({"vertical": {"whit": 1.0}}, {}, "sensor: whit: unknown argument; choose one of white, pink"),
         ({"vertical": {"white": -1.0}}, {}, "sensor: white: -1.0 is out of range"),
-        ({"vertical": {"drop_outs": 1.0}}, {}, "drop_outs is a share below 1"),
+        ({"vertical": {"drop_outs": 0.6}}, {}, "0.6 of the samples cannot be lost 1.0 in a row; give a sm"),
+        ({"vertical": {"band": 0.0}}, {}, "sensor: band: 0.0 is out of range; give one above 0"),
+        ({"vertical": {}}, {"rate": 10.0}, "rate: 10 Hz gives 8 samples of 0.8 s; raise it"),
         ({"vertcal": {}}, {}, "vertcal: no such signal"),
         ({"vertical": {}}, {"rate": 0.0}, "rate: 0 Hz is out of range"),
     ],
@@ -155,3 +157,19 @@ def test_order_amplitudes_and_phases_come_back_in_every_format(tmp_path, case, k
             at = order * turns
             assert abs(back[at] - true[at]) < 0.005 * abs(true[at]) + 2e-7, (name, order)
     assert found["vertical"].values.mean() - case["vertical"].values.mean() == pytest.approx(3e-4, abs=5e-6)
+
+
+def test_a_run_up_is_sensed_at_its_speeds(tmp_path):
+    passage = rubhpc.run_up("mokhtar2017", start="1200 rpm", stop="1800 rpm", time="1 s", clearance="5 mm")
+    sensed = sense(passage, {"vertical": {"step": 1e-8}, "stator_lateral": {}}, rate=12800.0)
+    sensed.to_dataframe().to_csv(tmp_path / "up.csv")
+    found = rubhpc.measured(
+        tmp_path / "up.csv",
+        time={"column": "time"},
+        speed={"column": "key_phasor", "level": 2.5},
+        signals={"vertical": {"unit": "m"}},
+    )
+    own = passage["amplitude_vertical"].sel(order=1).values
+    back = found["amplitude_vertical"].sel(order=1).values  # from the second pulse on
+    assert back[3:-4] == pytest.approx(own[4 : back.size - 3], rel=2e-3)
+    assert found["speed"].values[3:-4] == pytest.approx(passage["speed"].values[4 : back.size - 3], rel=2e-3)
