@@ -124,5 +124,5 @@ $(VENV)-lowest/.installed: pyproject.toml $(VENV)/.made
 	@$(BIN)/python -m venv --clear $(VENV)-lowest
 	@$(VENV)-lowest/bin/python -m pip install --quiet --no-compile uv
 	@$(VENV)-lowest/bin/uv pip install --quiet --python $(VENV)-lowest --resolution lowest-direct \
-		--only-binary :all: --no-binary rubhpc --editable '.[mpi,parquet,scale]' --group test
+		--only-binary :all: --no-binary rubhpc --editable '.[measured,mpi,parquet,scale]' --group test
 	@touch $@

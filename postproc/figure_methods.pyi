@@ -65,7 +65,7 @@ class FigureMethods:
     ) -> Axes | list[Axes]: ...
     def hht(
         self,
-        signal: str = ...,
+        signal: str | None = ...,
         *,
         contact: Optional[Literal['masked', 'kept']] = ...,
         revolutions: int = ...,
@@ -121,7 +121,7 @@ class FigureMethods:
     ) -> Axes | list[Axes]: ...
     def polar(
         self,
-        signal: str = ...,
+        signal: str | None = ...,
         *,
         order: float = ...,
         over: Optional[str] = ...,

@@ -15,6 +15,8 @@ from rubhpc.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from postproc.accessor import open  # noqa: A004 - the public name
+    from postproc.measured.measured import measured
+    from postproc.signals.sensors import Sensor, sense
     from rubhpc.branch import branch
     from rubhpc.errors import InputError, NoPeriodicMotion, RubError, StoppedEarly, StoreError
     from rubhpc.fem.assemble import assemble
@@ -50,6 +52,7 @@ __all__ = [
     "Record",
     "Rig",
     "RubError",
+    "Sensor",
     "State",
     "Stator",
     "StoppedEarly",
@@ -61,12 +64,14 @@ __all__ = [
     "branch",
     "least_knock",
     "linear_design",
+    "measured",
     "open",
     "periodic",
     "read_rig",
     "read_study",
     "run",
     "run_up",
+    "sense",
     "simulate",
 ]
 
@@ -85,6 +90,7 @@ _HOMES = {
     "Record": "rubhpc.integrate.record:Record",
     "Rig": "rubhpc.rig.rig:Rig",
     "RubError": "rubhpc.errors:RubError",
+    "Sensor": "postproc.signals.sensors:Sensor",
     "State": "rubhpc.integrate.record:State",
     "Stator": "rubhpc.rig.stators:Stator",
     "StoppedEarly": "rubhpc.errors:StoppedEarly",
@@ -96,18 +102,20 @@ _HOMES = {
     "branch": "rubhpc.branch:branch",
     "least_knock": "rubhpc.knocks:least_knock",
     "linear_design": "rubhpc.fem.linear_design:linear_design",
+    "measured": "postproc.measured.measured:measured",
     "open": "postproc.accessor:open",
     "periodic": "rubhpc.periodic:periodic",
     "read_rig": "rubhpc.rig.reading:read_rig",
     "read_study": "rubhpc.study.study:read_study",
     "run": "rubhpc.running.driver:run",
     "run_up": "rubhpc.run_up:run_up",
+    "sense": "postproc.signals.sensors:sense",
     "simulate": "rubhpc.simulate:simulate",
 }
 
 
 # Modules that register what datasets of a function have: the figures of `rub`.
-_BESIDES = {"run_up": "postproc.accessor"}
+_BESIDES = {"measured": "postproc.accessor", "run_up": "postproc.accessor"}
 
 
 class _Package(ModuleType):

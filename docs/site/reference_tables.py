@@ -20,6 +20,7 @@ import click
 
 import postproc
 import rubhpc
+from postproc.measured.keys import MeasuredKeys, SignalKeys, SlowRoll, SpeedKeys, TimeKeys
 from rubhpc.cli import commands
 from rubhpc.input.fields import key_of
 from rubhpc.rig.probes import Probe
@@ -38,7 +39,13 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
 _ASKED = re.compile(r"^<!-- generated: (\w+) -->$(?:\n\n.*?\n<!-- end -->$)?", re.MULTILINE | re.DOTALL)
-_READABLE = ("axes", "study", "rig", "variables")  # commands have --help, the others are Sphinx's directives
+_READABLE = (
+    "axes",
+    "study",
+    "rig",
+    "measured",
+    "variables",
+)  # commands have --help, the others are Sphinx's directives
 # Table of a file -> the dataclass that declares its keys, in the order of the pages.
 STUDY_TABLES = {
     "[contact]": Contact,
@@ -53,7 +60,20 @@ STUDY_TABLES = {
     "[drive]": DriveKeys,
     "[run]": Run,
 }
-ROOMS = ("store", "signals", "cases", "figures")  # of postproc, whose functions the reference shows
+MEASURED_TABLES = {
+    "Top of the file": MeasuredKeys,
+    "[time]": TimeKeys,
+    "[speed]": SpeedKeys,
+    "[signal.NAME]": SignalKeys,
+    "[slow_roll]": SlowRoll,
+}
+ROOMS = (
+    "store",
+    "signals",
+    "measured",
+    "cases",
+    "figures",
+)  # of postproc, whose functions the reference shows
 
 
 def rig_tables() -> dict[str, type]:
@@ -329,6 +349,7 @@ _TABLES = {
     "axes": axis_table,
     "study": lambda: key_tables(STUDY_TABLES),
     "rig": lambda: key_tables(rig_tables()),
+    "measured": lambda: key_tables(MEASURED_TABLES),
     "commands": command_sections,
     "variables": variable_sections,
     "python": python_names,

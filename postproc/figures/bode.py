@@ -11,6 +11,7 @@ from postproc.figures.overlay import overlaid
 from postproc.figures.run_up_marks import RPM, critical_speeds, falling, written_speeds
 from postproc.figures.ticks import degree_steps
 from postproc.signals.orders import order_over_speed, written_lag
+from postproc.signals.spectra import default_signal
 from postproc.store.run_ups import is_run_up
 from postproc.store.units import short_name
 from postproc.store.variables import require_results
@@ -62,7 +63,7 @@ def bode(
         Draw the cases along AXIS over one another.
     """
     named = (signal,) if isinstance(signal, str) else signal
-    signals = tuple(dict.fromkeys(named)) or ("vertical",)
+    signals = tuple(dict.fromkeys(named)) or (default_signal(cases, "vertical"),)
     shown = order_over_speed(cases, signals, order, over)
     for name in signals:
         require_results(shown[f"amplitude_{name}"], cases)

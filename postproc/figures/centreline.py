@@ -10,6 +10,7 @@ from postproc.figures.drawing import Drawing
 from postproc.figures.run_up_marks import APART, draw_rotation, name_speeds
 from postproc.signals.places import moved_at
 from postproc.signals.run_up_spectra import mean_positions
+from postproc.store.attributes import MEASURED
 from postproc.store.rig_of_case import stator_places, stators_around
 from rubhpc.units import scale_for
 
@@ -47,7 +48,9 @@ def centreline(
     """
     cases = moved_at(cases, probes, node, stator)
     shown = mean_positions(cases, ["vertical", "horizontal"])
-    where = str(cases["vertical"].attrs.get("place", "the disc")).removeprefix("motion at ")
+    _, is_named, where = str(cases["vertical"].attrs.get("place", "")).partition("motion at ")
+    if not is_named:
+        where = "the probes" if MEASURED in cases.attrs else "the disc"
     clearance = _clearance(cases)
     return Drawing(
         shown=shown, draw=lambda axes: draw_centreline(shown, axes[0], where, clearance), height=85

@@ -17,6 +17,8 @@ from postproc.signals.hilbert_huang import (
     median_frequency,
     span_frequencies,
 )
+from postproc.signals.spectra import default_signal
+from postproc.store.attributes import MEASURED
 from postproc.store.rig_of_case import natural_frequencies, stator_frequencies
 from postproc.store.units import plain_number, scale_of, short_name
 from postproc.store.worst import at_most_loaded_stator
@@ -40,7 +42,7 @@ _SHADE = "0.9"
 
 def hht(
     cases: xr.Dataset,
-    signal: str = "torsion",
+    signal: str | None = None,
     *,
     contact: Literal["masked", "kept"] | None = None,
     revolutions: Count = 4,
@@ -57,10 +59,10 @@ def hht(
     cases
         One case.
     signal
-        Which recorded signal.
+        Which recorded signal [default: torsion].
     contact
         Leave out spans in contact, with windows over the others, or keep them [default: kept for a stator's
-        signals].
+        signals, and where contact was not measured].
     revolutions
         The last ones.
     mode
@@ -69,6 +71,7 @@ def hht(
         End of the ordinate, Hz [default: twice the natural frequency].
     """
     limit = end_of_abscissa(max, orders=False)
+    signal = signal or default_signal(cases, "torsion")
     if signal in cases and "stator" in cases[signal].dims:  # its contacts and natural frequency too
         cases = at_most_loaded_stator(cases)
     shown = hilbert_huang(cases, signal, contact=contact, revolutions=revolutions, n_mode=mode)
@@ -222,7 +225,9 @@ def _medians(shown: xr.Dataset, mode: int) -> Iterator[str]:
             yield f"median frequency {where} {touching:.2f} Hz; no span out of contact oscillates"
         return
     each = ", ".join(f"{f:.1f}" for f in span_frequencies(shown, mode).dropna("span").values)
-    yield f"median frequency out of contact {middle:.2f} Hz (span by span: {each})"
+    is_unknown = MEASURED in shown.attrs and not shown["contact"].any()
+    where = "" if is_unknown else " out of contact"
+    yield f"median frequency{where} {middle:.2f} Hz (span by span: {each})"
     spread = {str(name): float(width) for name, width in contact_bandwidth(shown, mode).items()}
     if math.isfinite(spread["contact"]):
         yield f"interquartile spread {spread['contact']:.0f} Hz in contact, {spread['free']:.0f} Hz free"

@@ -157,7 +157,9 @@ def _draw_around(
     is not much larger than the orbit and near it.
     """
     reach = _MARGIN * view.half
-    is_of_gap = bool(stators_around(data)) and data["vertical"].attrs.get("units", "m") == "m"
+    is_of_gap = (
+        "clearance" in data and bool(stators_around(data)) and data["vertical"].attrs.get("units", "m") == "m"
+    )
     gap = float(data["clearance"].values) * factor if is_of_gap else 0.0
     ring = centre + (_shifts(data).mean(axis=0) * factor if "carrier_vertical" in data else 0.0)
     toward = view.middle - ring

@@ -11,6 +11,7 @@ from postproc.figures.drawing import Drawing
 from postproc.figures.overlay import overlaid
 from postproc.figures.run_up_marks import critical_speeds, draw_rotation, name_speeds, written_speeds
 from postproc.signals.orders import order_over_speed
+from postproc.signals.spectra import default_signal
 from postproc.store.run_ups import is_run_up
 from postproc.store.variables import probe_of, probes_of, require_results
 from rubhpc.errors import InputError
@@ -28,7 +29,7 @@ _LAGS = range(0, 360, 30)  # degrees
 
 
 def polar(
-    cases: xr.Dataset, signal: str = "vertical", *, order: Positive = 1.0, over: Axis | None = None
+    cases: xr.Dataset, signal: str | None = None, *, order: Positive = 1.0, over: Axis | None = None
 ) -> Drawing:
     """Polar plot: amplitude and phase lag of an order over the speed.
 
@@ -40,12 +41,13 @@ def polar(
     cases
         All axes but the speed and `over` are of one value, or selected.
     signal
-        A displacement or a probe.
+        A displacement or a probe [default: vertical].
     order
         Multiple of the spin speed; 1 is 1X.
     over
         Draw the cases along AXIS over one another.
     """
+    signal = signal or default_signal(cases, "vertical")
     shown = order_over_speed(cases, (signal,), order, over)
     require_results(shown[f"amplitude_{signal}"], cases)
     if not shown[f"phase_{signal}"].notnull().any():

@@ -16,6 +16,7 @@ from postproc.signals.lines import SPIKE, spikes, strongest_lines
 from postproc.signals.places import signal_or_whirl
 from postproc.signals.run_up_spectra import run_up_spectra
 from postproc.signals.spectra import spectrum_data
+from postproc.store.attributes import MEASURED
 from postproc.store.rig_of_case import frequencies_at_speed
 from postproc.store.units import scale_of, short_name
 from postproc.store.variables import require_results
@@ -94,7 +95,9 @@ def spectrum(
     abscissa = "order" if orders else "frequency"
     limit = limit or default_limit(shown, abscissa)
     natural = frequencies_at_speed(cases, speed) if "rig" in cases.attrs and speed is not None else None
-    found = strongest_lines(shown, lines, natural=natural) if over is None and lines else None
+    digits = 2 if MEASURED in cases.attrs else 3
+    is_named = over is None and lines
+    found = strongest_lines(shown, lines, natural=natural, digits=digits) if is_named else None
     return Drawing(
         shown=shown.to_dataset(name=str(shown.name)),
         draw=lambda axes: draw_spectrum(shown, axes[0], found, abscissa, limit, log),

@@ -13,7 +13,7 @@ from postproc.figures.options import spin_speed
 from postproc.figures.overlay import overlaid
 from postproc.figures.run_up_marks import title_of_speeds
 from postproc.figures.small_multiples import legend_below
-from postproc.signals.waveforms import DEFAULT_SIGNALS, waveform_data
+from postproc.signals.waveforms import default_signals, waveform_data
 from postproc.store.units import displayed, scale_of, short_name
 from postproc.store.variables import require_results
 
@@ -47,7 +47,7 @@ def waveform(
     cases
         One case, or cases along the axis `over`.
     signal
-        May be repeated [default: motion and contact force].
+        May be repeated [default: motion and contact force, or all that was measured].
     revolutions
         The last ones, or those around the speed `at`.
     at
@@ -56,7 +56,7 @@ def waveform(
         Draw the cases along AXIS over one another.
     """
     named = (signal,) if isinstance(signal, str) else signal
-    signals = tuple(dict.fromkeys(named)) or DEFAULT_SIGNALS
+    signals = tuple(dict.fromkeys(named)) or default_signals(cases)
     speed = None if at is None else spin_speed(at, "--at")
     shown = waveform_data(cases, signals, revolutions, over, speed)
     return Drawing(shown=shown, draw=lambda axes: draw_panels(shown, axes), panels=(len(signals), 1))

@@ -18,6 +18,7 @@ import xarray as xr
 
 from postproc.signals.contacts import sample_time, signal_of, touching
 from postproc.signals.spectra import last_revolutions
+from postproc.store.attributes import MEASURED
 from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
@@ -123,14 +124,17 @@ def hilbert_huang(
     Dataset over (mode, sample)
         `imf` and `amplitude` (the signal's unit), `frequency` (Hz, NaN where undefined) and `energy` (the
         square of the amplitude), with the coordinates `time` (s), `revolution`, `contact` and `span` (counted
-        from 0 out of contact, -1 in contact).
+        from 0 out of contact, -1 in contact). Where contact was not measured, all of it counts as out of
+        contact.
     """
-    contact = contact or ("kept" if signal.startswith("stator") else "masked")
+    is_known = "contact_force" in case or MEASURED not in case.attrs
+    contact = contact or ("kept" if signal.startswith("stator") or not is_known else "masked")
     if contact not in CONTACT:
         raise InputError(f"contact: {contact}: is unknown; choose {' or '.join(CONTACT)}")
     if n_mode < 1:
         raise InputError(f"n_mode: {n_mode} is out of range; it must be at least 1")
-    wave, touches = signal_of(case, signal, stator), touching(case, stator)
+    wave = signal_of(case, signal, stator)
+    touches = touching(case, stator) if is_known else xr.zeros_like(wave, dtype=bool)
     if revolutions is not None:
         wave, touches = last_revolutions(wave, revolutions), last_revolutions(touches, revolutions)
     dt = sample_time(case)

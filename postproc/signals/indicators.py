@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import xarray as xr
 
+from postproc.signals.sensors import Sensor
 from postproc.signals.spectra import samples_per_revolution
 from postproc.store.axes import axes_of, source
 from postproc.store.rig_of_case import natural_frequencies, rig_axes, stator_frequencies
@@ -61,8 +62,8 @@ def indicator_scores(
 
     Noise of level 1 is, in each channel, white Gaussian noise whose rms in 1 kHz is that channel's median
     vibration over the cases that touch, and, as strong again, benign harmonics: random 1X, 2X and 3X such as
-    misalignment or a drive bring in. Both are drawn line by line of the spectrum, which for whole revolutions
-    is the same as in time. A case's draws depend on `seed` and its place in the study only, and are the same
+    misalignment or a drive bring in (`sensors.Sensor`). A case's draws depend on `seed` and its place in the
+    study only, and are the same
     at all levels.
 
     Parameters
@@ -213,24 +214,26 @@ def _block(
     whirl, twist = (np.broadcast_to(a, (*shape, a.shape[-1])) for a in (whirl, twist))
     shake = np.broadcast_to(shake, (*shape, *shake.shape[-2:]))
     out = np.full((*shape, len(INDICATORS), noise.levels.size, noise.n_draw), math.nan)
-    sizes = math.hypot(*reference[:2]), reference[2], reference[3]
+    turns = np.arange(n_sample) / n
     for i in np.ndindex(*shape):
         if not np.isfinite(twist[i][0]):
             continue
         rng = np.random.default_rng([noise.seed, int(places[i])])
         spacing = float(rates[i]) / n_turn  # Hz from line to line
-        white = math.sqrt(spacing / _BANDWIDTH)  # rms of a line, of unit noise
+        sizes = [*reference, *[reference[-1]] * (n_stator - 1)]
+        added = [_noise(turns, n * float(rates[i]), size, noise.n_draw, rng) for size in sizes]
+        orbit = np.fft.fft(added[0] + 1j * added[1], axis=-1) / n_sample
+        twists, *shakes = (np.fft.rfft(one, axis=-1) * (math.sqrt(2) / n_sample) for one in added[2:])
         channels = [
-            (whirl[i], _whirl_lines(n_turn, n_sample), sizes[0], math.sqrt(1 / 2)),  # half whirls backward
-            (twist[i], _twist_lines(float(twist_order[i]), n_turn), sizes[1], 1.0),
+            (whirl[i], orbit, _whirl_lines(n_turn, n_sample)),
+            (twist[i], twists, _twist_lines(float(twist_order[i]), n_turn)),
             *(
-                (shake[i][k], _band_lines(float(shake_order[i][k]), n_turn), sizes[2], 1.0)
+                (shake[i][k], shakes[k], _band_lines(float(shake_order[i][k]), n_turn))
                 for k in range(n_stator)
             ),
         ]
         whirling, twisting, *shaking = (
-            _with_noise(lines, at, n_turn, size, gain * white, noise, rng)
-            for lines, at, size, gain in channels
+            lines[at] + noise.levels[:, None, None] * one[:, at] for lines, one, at in channels
         )
         out[i] = [
             _decibels(_power(twisting) / spacing),
@@ -241,27 +244,19 @@ def _block(
     return out
 
 
-def _with_noise(
-    lines: Lines,
-    at: NDArray[np.intp],
-    n_turn: int,
-    size: float,
-    white: float,
-    noise: Noise,
-    rng: np.random.Generator,
-) -> Lines:
-    """Return some lines of a spectrum under noise, (n_level, n_draw, n_line), rms amplitudes.
+def _noise(turns: Floats, rate: float, size: float, n_draw: int, rng: np.random.Generator) -> Floats:
+    """Return what sensors add at level 1 to a channel of vibration with an rms of `size`, (n_draw, n_sample).
 
-    `white` is the rms of a line of white noise of unit rms. Benign harmonics of unit rms share it evenly on
-    the average; the draws are complex Gaussian, so that their amplitudes differ as well as their phases.
+    White noise and, shared evenly on the average, benign harmonics, whose amplitudes differ as well as their
+    phases. `rate` is that of the samples, Hz.
     """
-    draws = rng.standard_normal((2, noise.n_draw, at.size)) / math.sqrt(2)
-    benign = rng.standard_normal((2, noise.n_draw, len(_BENIGN))) / math.sqrt(2 * len(_BENIGN))
-    added = white * (draws[0] + 1j * draws[1])
-    for j, order in enumerate(_BENIGN):
-        added[:, at == order * n_turn] += (benign[0] + 1j * benign[1])[:, j, None]
-    noisy: Lines = lines[at] + size * noise.levels[:, None, None] * added
-    return noisy
+    draws = []
+    for _ in range(n_draw):
+        benign = rng.standard_normal((len(_BENIGN), 2)) @ (1.0, 1j) * (size / math.sqrt(len(_BENIGN)))
+        run_out = tuple(zip(_BENIGN, np.abs(benign).tolist(), np.angle(benign).tolist(), strict=True))
+        sensor = Sensor(white=size * math.sqrt(0.5 * rate / _BANDWIDTH), run_out=run_out)
+        draws.append(sensor.after_clock(sensor.before_clock(np.zeros(turns.size), turns, rate), rng))
+    return np.array(draws)
 
 
 def _twist_lines(natural: float, n_turn: int) -> NDArray[np.intp]:

@@ -21,15 +21,15 @@ _CLOSE = 0.01  # of a frequency, up to which a natural one is near
 _NAMED = 0.25  # lines between the order of a sine and the one that it is named by, at most
 
 
-def order_name(order: float, tolerance: float = _EXACT, period: int = 1) -> str:
-    """Name an order as a fraction within `tolerance`, as in "1/2X" or "-1X", else by decimals.
+def order_name(order: float, tolerance: float = _EXACT, period: int = 1, digits: int = 3) -> str:
+    """Name an order as a fraction within `tolerance`, as in "1/2X" or "-1X", else by so many decimals.
 
     A motion with a period of so many revolutions has lines at multiples of `1 / period` alone.
     """
     fraction = Fraction(round(order * period), period)
     if fraction != 0 and abs(float(fraction) - order) <= tolerance:
         return f"{fraction}X"
-    return f"{order:.3f}X"
+    return f"{order:.{digits}f}X"
 
 
 def sine_order(order: NDArray[np.float64], amplitude: NDArray[np.float64], peak: int) -> float:
@@ -51,11 +51,13 @@ def sine_order(order: NDArray[np.float64], amplitude: NDArray[np.float64], peak:
     return float(order[peak] + share * (order[higher] - order[peak]))
 
 
-def _name_line(order: NDArray[np.float64], amplitude: NDArray[np.float64], peak: int, period: int) -> str:
+def _name_line(
+    order: NDArray[np.float64], amplitude: NDArray[np.float64], peak: int, period: int, digits: int
+) -> str:
     """Name of a peak: the fraction at the order of its sine, or else at its own, or else decimals."""
     near = _NAMED * abs(float(order[1] - order[0]))
-    of_sine = order_name(sine_order(order, amplitude, peak), near, period)
-    at_line = order_name(float(order[peak]), _EXACT, period)
+    of_sine = order_name(sine_order(order, amplitude, peak), near, period, digits)
+    at_line = order_name(float(order[peak]), _EXACT, period, digits)
     return of_sine if "." in at_line else at_line if "." in of_sine else of_sine
 
 
@@ -88,6 +90,7 @@ def strongest_lines(
     n_line: int = 6,
     threshold: float = 0.02,
     natural: Mapping[str, Sequence[float]] | None = None,
+    digits: int = 3,
 ) -> xr.Dataset:
     """Return the strongest local maxima of a spectrum, strongest first, with their names.
 
@@ -100,6 +103,8 @@ def strongest_lines(
         Lines below this fraction of the strongest are left out.
     natural : mapping of kind to frequencies in Hz, optional
         Natural frequencies; the spectrum then needs the coordinate `frequency`.
+    digits : int
+        Decimals of an order that is no fraction.
 
     Returns
     -------
@@ -118,7 +123,7 @@ def strongest_lines(
     peaks = np.flatnonzero(is_peak)
     peaks = peaks[np.argsort(-amplitude[peaks], kind="stable")][:n_line]
     period = max(int(spectrum.coords["period"]), 1) if "period" in spectrum.coords else 1
-    names = [_name_line(order, amplitude, i, period) for i in peaks.tolist()]
+    names = [_name_line(order, amplitude, i, period, digits) for i in peaks.tolist()]
     lines = xr.Dataset(
         {
             "order": ("line", order[peaks], {"units": "1"}),

@@ -6,9 +6,10 @@ import math
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
-from postproc.signals.spectra import WHIRL
+from postproc.signals.spectra import WHIRL, default_signal
+from postproc.store.attributes import MEASURED
 from postproc.store.axes import source
-from postproc.store.rig_of_case import recorded_node, rig_of
+from postproc.store.rig_of_case import has_place, recorded_node, rig_of
 from postproc.store.variables import probe_of, probes_of, require_variables
 from rubhpc.errors import InputError
 from rubhpc.rig.probes import TWISTS
@@ -23,7 +24,12 @@ _LEAST_SINE = 0.05  # of the angle between two probes: 3 degrees
 
 
 def named_places(store: xr.Dataset) -> xr.Dataset:
-    """Return the store with the attribute `place` of its signals, for captions; as it is without a rig."""
+    """Return the store with the attribute `place` of its signals, for captions; as it is without a rig.
+
+    Measured signals have theirs.
+    """
+    if MEASURED in store.attrs:
+        return store
     try:
         disc, nodes = recorded_node(store), {stator.node for stator in rig_of(store).stator}
     except InputError:  # none, or one of another version
@@ -79,15 +85,16 @@ def moved_at(
             raise InputError(f"{source(store)}: stator: there is no {stator}; give {known}")
         node = stators[stator - 1].node
     if probes is not None:
-        return _seen_by_two(store, *_pair(store, probes))
-    if node is None or node == recorded_node(store):
+        return seen_by_two(store, *_pair(store, probes))
+    recorded_nodes = [recorded_node(store)] if node is not None and has_place(store) else []
+    if node is None or node in recorded_nodes:
         return store
     probed = [p for p in probes_of(store).values() if p["quantity"] == "displacement" and "node" in p]
     pairs = {a["node"]: (a, b) for a, b in combinations(probed, 2) if a["node"] == b["node"] and _sine(a, b)}
     if node in pairs:
-        return _seen_by_two(store, *pairs[node])
-    known = ", ".join(str(n) for n in sorted({recorded_node(store), *pairs}))
-    fix = f"choose one of {known}, or record two displacement probes at it"
+        return seen_by_two(store, *pairs[node])
+    known = ", ".join(str(n) for n in sorted({*recorded_nodes, *pairs}))
+    fix = f"choose one of {known}, or record two displacement probes at it" if known else "leave it out"
     raise InputError(f"{source(store)}: node {node}: its motion is not recorded; {fix}")
 
 
@@ -111,7 +118,7 @@ def signal_or_whirl(
         given = {"--probes": probes, "--node": node, "--stator": stator}
         if named := next((name for name, value in given.items() if value is not None), None):
             raise InputError(f"{named} names the orbit of a full spectrum; add --full, or give --signal")
-        return store, signal or default
+        return store, signal or default_signal(store, default)
     if signal is not None:
         raise InputError(
             f"--full is of the orbit and conflicts with --signal {signal}; leave out one of them"
@@ -119,7 +126,7 @@ def signal_or_whirl(
     return moved_at(store, probes, node, stator), WHIRL
 
 
-def _seen_by_two(store: xr.Dataset, first: dict[str, Any], second: dict[str, Any]) -> xr.Dataset:
+def seen_by_two(store: xr.Dataset, first: dict[str, Any], second: dict[str, Any]) -> xr.Dataset:
     """Return the store with the motion that two probes of different directions see."""
     names = [f"{PROBE}{probe['name']}" for probe in (first, second)]
     require_variables(store, names)
@@ -168,7 +175,9 @@ def _sine(first: dict[str, Any], second: dict[str, Any]) -> float:
 
 
 def _place(probe: dict[str, Any]) -> str:
-    return f"node {probe['node']}" if "node" in probe else f"the tip of stator {probe['stator']}"
+    """Where a probe is; a measured one may not say."""
+    of_stator = f"the tip of stator {probe['stator']}" if "stator" in probe else "the probes"
+    return f"node {probe['node']}" if "node" in probe else of_stator
 
 
 def _angle(probe: dict[str, Any]) -> str:

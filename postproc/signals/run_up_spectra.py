@@ -12,6 +12,7 @@ from postproc.signals.spectra import WHIRL, check_signal
 from postproc.store.axes import source
 from postproc.store.run_ups import first_around, is_run_up
 from postproc.store.select import narrow
+from postproc.store.variables import require_variables
 from rubhpc.errors import InputError
 from rubhpc.schema import TURNED
 
@@ -123,7 +124,10 @@ def _case(store: xr.Dataset, signals: Sequence[str]) -> tuple[xr.Dataset, int, i
     for signal in signals:
         check_signal(signal, store)
     if not is_run_up(store):
-        raise InputError(f"{source(store)}: its speeds are constant; give a store of a study with [run_up]")
+        raise InputError(
+            f"{source(store)}: its speed is constant; give a run-up, as of a study with [run_up]"
+        )
+    require_variables(store, signals)
     data = (narrow(store, [*signals, "speed"]) if "status" in store else store[[*signals, "speed"]]).load()
     per_revolution = round(1.0 / float(data[TURNED][1] - data[TURNED][0]))
     n = int(np.isfinite(data["speed"].values).sum())

@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from postproc.store.attributes import MEASURED
 from postproc.store.axes import find_axis, source
 from postproc.store.select import narrow
+from postproc.store.variables import require_variables
 from rubhpc import spectra
 from rubhpc.errors import InputError
 from rubhpc.schema import PROBE, SIGNAL_NAMES, is_signal
@@ -111,6 +113,8 @@ def periodic_spectrum(
         vertical, horizontal = (whole_periods(data[n], data.get("period")) for n in names[:2])
         return full_spectrum(vertical, horizontal), data
     check_signal(signal)
+    if MEASURED in store.attrs:
+        require_variables(store, [signal])
     known = [n for n in (signal, f"spectrum_{signal}", "period") if n in store]
     data = narrow(store, [*known, "spin_speed"], spread)
     if signal in data:
@@ -140,7 +144,7 @@ def spectrum_data(store: xr.Dataset, signal: str, over: str | None = None) -> xr
     spread = [find_axis(store, over)] if over else []
     spectrum, data = periodic_spectrum(store, signal, spread)
     period = proven_period(store, spread)
-    if period is not None:
+    if period is not None and bool((period > 0).any()):
         spectrum = spectrum.assign_coords(period=period)
     return with_frequency(spectrum, data["spin_speed"].compute())
 
@@ -163,6 +167,13 @@ def with_frequency(spectrum: xr.DataArray, spin_speed: xr.DataArray) -> xr.DataA
     frequency = (rate * spectrum["order"]).assign_attrs(units="Hz", long_name="frequency")
     dims = [d for d in spectrum.dims if d in frequency.dims]
     return spectrum.assign_coords(frequency=frequency.transpose(*dims))
+
+
+def default_signal(store: xr.Dataset, wanted: str) -> str:
+    """Return the signal that a figure draws by default: the one `wanted`, or the first that was measured."""
+    if MEASURED not in store.attrs or wanted in store:
+        return wanted
+    return next(str(name) for name in store.data_vars if is_signal(str(name)))
 
 
 def check_signal(signal: str, store: xr.Dataset | None = None) -> None:

@@ -10,11 +10,13 @@ import xarray as xr
 
 from postproc.signals.carried import NEEDED, mean_shift
 from postproc.signals.spectra import check_signal, samples_per_revolution
+from postproc.store.attributes import MEASURED
 from postproc.store.axes import find_axis, source
 from postproc.store.rig_of_case import is_carried
 from postproc.store.run_ups import first_around, is_run_up
 from postproc.store.select import narrow
 from rubhpc.errors import InputError
+from rubhpc.schema import is_signal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,6 +26,13 @@ if TYPE_CHECKING:
 _AT_A_SPEED = 4  # revolutions around a speed of a run-up, by default
 _ONE_SPEED = 2e-3  # by which the speeds of several cases may differ where one is named
 DEFAULT_SIGNALS = ("vertical", "horizontal", "torsion", "contact_force")
+
+
+def default_signals(store: xr.Dataset) -> tuple[str, ...]:
+    """Return the signals that are drawn by default: motion and contact force, or all that were measured."""
+    if MEASURED not in store.attrs:
+        return DEFAULT_SIGNALS
+    return tuple(str(name) for name in store.data_vars if is_signal(str(name)))
 
 
 def waveform_data(
@@ -94,7 +103,8 @@ def orbit_data(
         As of `waveform_data`.
     """
     spread = [find_axis(store, over)] if over else []
-    data = narrow(store, ["vertical", "horizontal", "clearance"], spread)
+    names = ["vertical", "horizontal", *([] if MEASURED in store.attrs else ["clearance"])]
+    data = narrow(store, names, spread)
     data = _kept(store, data, revolutions, over, at)
     if not spread and is_carried(data) and all(name in store for name in NEEDED):
         tips = _kept(store, narrow(store, NEEDED, ["stator"]), revolutions, None, at)

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
+MEASURED = "measured"  # attribute of what was measured: the file with the data
 _OF_ROOT = ("study", "rig", "versions")  # tables
 _TEXTS = ("units", "long_name", "flag_meanings")  # of arrays
 _FILL = "_FillValue"  # which xarray adds to a copy

@@ -36,6 +36,8 @@ def ordered_axes(store: xr.Dataset, figure: str) -> list[str]:
     if not axes:
         what = "the cases of a sample have no order, rubhpc map draws them"
         left = what if drawn_axes(store) else "this selection is one case"
+        if "revolution" in store.dims:
+            left = "the speed of this case changes, rubhpc waterfall draws it"
         raise InputError(f"{source(store)}: {figure} needs an axis of several values; {left}")
     return axes
 

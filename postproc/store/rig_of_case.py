@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import xarray as xr
 
-from postproc.store.attributes import table_of
+from postproc.store.attributes import MEASURED, table_of
 from postproc.store.axes import source
 from rubhpc.errors import InputError
 from rubhpc.rig.reading import rig_from_dict, with_keys
@@ -37,7 +37,12 @@ def rig_of(case: xr.Dataset, values: Mapping[str, float] | None = None) -> Rig:
     """
     table = table_of(case, "rig")
     if not table:
-        raise InputError(f"{source(case)}: contains no rig; give a store that rubhpc has written")
+        fix = (
+            "add rig to the measured file"
+            if MEASURED in case.attrs
+            else "give a store that rubhpc has written"
+        )
+        raise InputError(f"{source(case)}: contains no rig; {fix}")
     rig = rig_from_dict(table, f"{source(case)}: rig")
     chosen = {
         str(n): float(c.values.item())
@@ -94,7 +99,12 @@ def _first_of_kinds(found: Sequence[Mode], kinds: Sequence[str]) -> dict[str, fl
 def _over_rig(
     case: xr.Dataset, along: str | None, frequencies_of: Callable[[Rig], dict[str, float]]
 ) -> dict[str, xr.DataArray]:
-    """Return the frequencies of a case's rig, Hz, as arrays over `along` where keys of the rig lie on it."""
+    """Return the frequencies of a case's rig, Hz, as arrays over `along` where keys of the rig lie on it.
+
+    None of a machine that was measured and has no rig.
+    """
+    if MEASURED in case.attrs and "rig" not in case.attrs:
+        return {}
     keys = [key for key in rig_axes(case) if key in case.coords and case[key].dims == (along,)]
     points: list[dict[str, float]] = [
         {key: float(v) for key, v in zip(keys, values, strict=True)}
@@ -112,20 +122,27 @@ def _over_rig(
     }
 
 
+def has_place(case: xr.Dataset) -> bool:
+    """Whether it is known at which node the motion is: what was measured may not say."""
+    return isinstance(case.attrs.get("node"), int) or "rig" in case.attrs
+
+
 def recorded_node(case: xr.Dataset) -> int:
-    """Return the node whose motion is recorded: that of the first stator, unless the rotor names another."""
+    """Return the node whose motion is drawn: the attribute `node` of the case, or else that of its rig.
+
+    There it is recorded at the first stator, unless the rotor names another node.
+    """
+    if isinstance(node := case.attrs.get("node"), int):
+        return node
     rig = rig_of(case)
     return rig.rotor.recorded_node([stator.node for stator in rig.stator])
 
 
 def stators_around(case: xr.Dataset) -> list[int]:
-    """Return which stators, from 0, stand around the node whose motion is drawn; others touch another disc.
-
-    It is the recorded one, unless the attribute `node` of the case names another.
-    """
+    """Return which stators, from 0, stand around the node whose motion is drawn."""
     if "rig" not in case.attrs:
         return []
-    node = case.attrs["node"] if "node" in case.attrs else recorded_node(case)
+    node = recorded_node(case)
     return [i for i, stator in enumerate(rig_of(case).stator) if stator.node == node]
 
 

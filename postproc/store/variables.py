@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from postproc.store.attributes import table_of
+from postproc.store.attributes import MEASURED, table_of
 from postproc.store.axes import source
 from rubhpc.errors import InputError
-from rubhpc.schema import PROBE, VARIABLES, role_of
+from rubhpc.schema import PROBE, VARIABLES, is_signal, role_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -35,6 +35,9 @@ def require_variables(store: xr.Dataset, names: Iterable[str]) -> None:
     for name in names:
         if name in store:
             continue
+        if MEASURED in store.attrs and is_signal(name):
+            known = [str(n) for n in store.data_vars if is_signal(str(n))]
+            raise InputError(f"{source(store)}: {name}: was not measured; there are {', '.join(known)}")
         is_recorded = name in VARIABLES or name.removeprefix(PROBE) in probes_of(store)
         role = role_of(name) if is_recorded else ""
         if role in LONG_ROLES:
@@ -72,6 +75,9 @@ def probe_of(store: xr.Dataset, name: str) -> dict[str, Any]:
     known = probes_of(store)
     name = name.removeprefix(PROBE)
     if name not in known:
-        fix = f"choose one of {', '.join(known)}" if known else "run the study with a [[record.probe]]"
+        fix = (
+            "run the study with a [[record.probe]]" if MEASURED not in store.attrs else f"add [signal.{name}]"
+        )
+        fix = f"choose one of {', '.join(known)}" if known else fix
         raise InputError(f"{source(store)}: no probe {name}; {fix}")
     return known[name]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from rubhpc.commands.selection import SELECT, open_cases, pairs
+from rubhpc.commands.selection import SELECT, measurement, open_cases, pairs
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -15,9 +15,24 @@ if TYPE_CHECKING:
     from postproc.catalogue import Figure, Option
 
 
+# Figures of signals, which may have been measured.
+MEASURED_FIGURES = {
+    "bode",
+    "cascade",
+    "centreline",
+    "hht",
+    "orbit",
+    "polar",
+    "spectrum",
+    "waterfall",
+    "waveform",
+}
 _store_argument = click.argument("store")
 _figure_option = click.option(
     "--figure", "output", metavar="FILE", help=".png, .pdf or .svg [default: STORE_COMMAND.png here]"
+)
+_measured_option = click.option(
+    "--measured", metavar="FILE", help="A measured file (TOML, or its data), drawn with the case."
 )
 _data_option = click.option("--data", metavar="FILE", help="Write the data too: .csv, .json, .zarr or .nc.")
 
@@ -26,14 +41,21 @@ def figure_command(figure: Figure) -> click.Command:
     """Return the command that draws a figure of a store."""
 
     def command(
-        store: str, selection: tuple[str, ...], output: str | None, data: str | None, **words: Any
+        store: str,
+        selection: tuple[str, ...],
+        output: str | None,
+        data: str | None,
+        measured: str | None = None,
+        **words: Any,
     ) -> None:
         for name, option in figure.options.items():
             if option.form == "pairs":
                 words[name] = dict(pairs(words[name], _flag(name)))
-        draw(figure, store, selection, words, output, data)
+        draw(figure, store, selection, words, output, data, measured)
 
     decorators: list[Callable[[Any], Any]] = [_store_argument, SELECT, _figure_option, _data_option]
+    if figure.name in MEASURED_FIGURES:
+        decorators.append(_measured_option)
     decorators += [_click_option(option) for option in figure.options.values()]
     for decorate in reversed(decorators):
         command = decorate(command)
@@ -47,14 +69,21 @@ def draw(
     words: dict[str, Any],
     output: str | None = None,
     data: str | None = None,
+    beside: str | None = None,
 ) -> None:
     """Draw and save a figure, write its data where asked, and print its lines and the paths of all files."""
+    from postproc.beside import figure_beside, samples_of
     from postproc.figures.style import check_figure_path
     from postproc.store.export import check_data_path, write_data
 
     path = check_figure_path(output or f"{Path(store).resolve().stem}_{figure.name}.png")
     data_path = check_data_path(data) if data else None
-    drawing = figure.of(open_cases(store, selection), **words)
+    cases = open_cases(store, selection)
+    if beside is None:
+        drawing = figure.of(cases, **words)
+    else:
+        found = measurement(beside, samples_per_revolution=samples_of(cases))
+        drawing = figure_beside(figure, cases, found, words, has_data=data_path is not None)
     for line in drawing.lines:
         click.echo(line)
     click.echo(str(drawing.save(path)))

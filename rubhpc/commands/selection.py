@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -22,11 +23,29 @@ SELECT = click.option(
 
 
 def open_cases(store: str, selection: tuple[str, ...]) -> xr.Dataset:
-    """Return the cases of a store that the command line selects."""
+    """Return the cases of a store, or of a measured file, that the command line selects."""
     from postproc.store.open import open_store
     from postproc.store.select import select
 
-    return select(open_store(store), dict(pairs(selection, "--select")))
+    cases = measurement(store) if is_measurement(store) else open_store(store)
+    return select(cases, dict(pairs(selection, "--select")))
+
+
+def is_measurement(path: str) -> bool:
+    """Whether a path is that of a measured file, not of a store, which is a directory."""
+    from postproc.measured.formats import FORMATS
+
+    return not Path(path).is_dir() and Path(path).suffix.lower() in (".toml", *FORMATS)
+
+
+def measurement(path: str, **keys: Any) -> xr.Dataset:
+    """Return the dataset of a measured file, and print what is wrong with the record on stderr."""
+    from postproc.measured.measured import measured
+
+    found = measured(path, **keys)
+    for note in filter(None, found.attrs["note"].split("\n")):
+        click.echo(f"note: {note}", err=True)
+    return found
 
 
 def pairs(texts: tuple[str, ...], option: str) -> list[tuple[str, str]]:

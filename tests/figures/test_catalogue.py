@@ -154,7 +154,7 @@ def test_some_declarations_become_the_options_that_users_know() -> None:
     context = click.Context(commands)
     cascade = commands.get_command(context, "cascade")
     assert list(options_of(cascade)) == [
-        *("store", "selection", "output", "data"),
+        *("store", "selection", "output", "data", "measured"),
         *("signal", "full", "probes", "node", "stator", "along", "form", "max", "orders", "order_lines"),
         "mark",
     ]

@@ -270,7 +270,9 @@ def test_what_has_no_run_up_is_refused():
     steady = xr.Dataset(
         {"vertical": ("sample", np.zeros(8))}, coords={"revolution": ("sample", np.arange(8))}
     )
-    with pytest.raises(InputError, match=r"its speeds are constant; give a store of a study with \[run_up\]"):
+    with pytest.raises(
+        InputError, match=r"its speed is constant; give a run-up, as of a study with \[run_up\]"
+    ):
         waterfall(steady)
     with pytest.raises(InputError, match="no such signal"):
         waterfall(run_up(), "vertcal")

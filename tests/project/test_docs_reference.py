@@ -22,7 +22,8 @@ import github_markdown  # noqa: E402
 import reference_tables as tables  # noqa: E402
 
 TABLES = tables.STUDY_TABLES | tables.rig_tables()
-KEYS = [(table, field) for table, owner in TABLES.items() for field in dataclasses.fields(owner)]
+ALL_TABLES = [*TABLES.items(), *tables.MEASURED_TABLES.items()]
+KEYS = [(table, field) for table, owner in ALL_TABLES for field in dataclasses.fields(owner)]
 DECLARED = [(table, field) for table, field in KEYS if "kind" in field.metadata]
 
 
@@ -39,7 +40,7 @@ def test_every_key_has_a_meaning_and_an_example_that_it_takes(
 
 
 def test_tables_of_keys_are_complete() -> None:
-    text = tables.key_tables(TABLES) + tables.axis_table()
+    text = tables.key_tables(TABLES) + tables.axis_table() + tables.key_tables(tables.MEASURED_TABLES)
     for _, key in DECLARED:
         assert f"| `{key_of(key)}` |" in text
     for axis in ("speed_ratio", "speed", "clearance_ratio", "clearance", "friction"):
