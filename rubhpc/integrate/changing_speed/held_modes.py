@@ -15,7 +15,7 @@ from rubhpc.integrate.changing_speed.mode_parts import (
     with_slip,
     without_renewed,
 )
-from rubhpc.integrate.changing_speed.near_modes import Linear, near_mode
+from rubhpc.integrate.changing_speed.near_modes import Linear
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary, width_without_modes
 from rubhpc.integrate.reduced_model.reduction import directions
 from rubhpc.integrate.reduced_model.touching import OpenBodies, contact_mode_among, open_bodies
@@ -135,7 +135,7 @@ class HeldModes(ModeLibrary):
         row, held = self._tabulated(mode, own, row)
         if self._beside:
             middle = Node.of(mode, held, self._slip_rows())
-            found = [self._node(mode, own, library) for library in (*self._beside, *self._risen)]
+            found = [self._node(mode, library) for library in (*self._beside, *self._risen)]
             nodes, n = [middle, *(node for node in found if node is not None)], 1 + len(self._beside)
             if len(nodes) > len(found):
                 risen = nodes[n] if self._risen else None
@@ -146,12 +146,12 @@ class HeldModes(ModeLibrary):
                 self._strange.add(mode.mask)
         self._held[mode.mask] = row, held
 
-    def _node(self, mode: ContactMode, own: Linear, library: HeldModes) -> Node | None:
+    def _node(self, mode: ContactMode, library: HeldModes) -> Node | None:
         """The same mode in another library; None where that has another motion."""
-        linear = library._linear(mode)
-        near = near_mode(mode, (own, linear), self.reduced, library.reduced)
-        found = near or matched(mode, library._solved(mode.mask))
-        return Node.of(found, library._hold(found, None, linear), library._slip_rows()) if found else None
+        found = matched(mode, library._solved(mode.mask))
+        if found is None:
+            return None
+        return Node.of(found, library._hold(found, None, library._linear(found)), library._slip_rows())
 
     def _tabulated(
         self, mode: ContactMode, linear: Linear, row: ModeTables | None = None

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from test_retuned_modes import LAWS, setup
 
-from rubhpc.integrate.changing_speed.followed_modes import NODES, matched
+from rubhpc.integrate.changing_speed.followed_modes import NODES
 from rubhpc.integrate.changing_speed.mode_parts import speeds_of
-from rubhpc.integrate.changing_speed.near_modes import near_mode
 from rubhpc.kernels.contact_modes import enter, enter_rest
 
 REACH = 20.0  # rad/s
@@ -154,25 +153,3 @@ def test_modes_follow_the_acceleration_in_second_order(q, law):
         errors.append(error_at(base, law, at, masks, 0.0, -1.0, is_risen=True))
     assert errors[0] < 1e-3, errors
     assert 3.0 < errors[0] / errors[1] < 5.0, errors
-
-
-@pytest.mark.parametrize("q", [1, 3])
-@pytest.mark.parametrize("law", LAWS, ids=lambda law: type(law).__name__)
-def test_modes_near_a_known_one_are_those_solved(q, law):
-    base = setup(q)
-    at = matrices_of(base, 30.0, 4000.0)
-    library, n_near = library_of(base, law, at), 0
-    other = library._with(at(0.9, 1.0))
-    for mask in law.masks[q]:
-        mode = library._solved(mask)
-        linear = library._linear(mode), other._linear(mode)
-        near, solved = near_mode(mode, linear, library.reduced, other.reduced), other._solved(mask)
-        if near is None:
-            continue
-        n_near, true, m = n_near + 1, matched(mode, solved), mode.n_eigenmode
-        response = np.arange(mode.exponent.size) == m
-        for name in ("exponent", "motion", "switch"):
-            own, expected = getattr(near, name)[..., ~response], getattr(true, name)[..., ~response]
-            assert np.abs(own - expected).max() <= 1e-8 * np.abs(expected).max(), (mask, name)
-        assert not near.exponent[mode.exponent.imag == 0.0].imag.any()  # by that kernels know decays
-    assert n_near > 0
