@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
-from rubhpc.integrate.changing_speed.followed_modes import between
+from rubhpc.integrate.changing_speed.mode_courses import between
 from rubhpc.integrate.changing_speed.range_errors import (
     PASSING,
     PLACES,

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.model import Model
     from rubhpc.integrate.changing_speed.piece_setup import HeldMatrices, PieceSetup
-    from rubhpc.kernels.retuning import Speeds
+    from rubhpc.kernels.filling import Speeds
 
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary
+from rubhpc.integrate.changing_speed.range_library import RangeLibrary
 from rubhpc.integrate.marches.modal import Place
 from rubhpc.kernels.pieces import FAST, QUICK
 
@@ -37,7 +37,7 @@ class Standing(NamedTuple):
     """End of a piece, in its own matrices."""
 
     setup: PieceSetup
-    library: RetunedLibrary
+    library: RangeLibrary
     end: Place
     constants: Floats  # values of the coordinates that do not move
     time: float  # s, since the piece began
@@ -61,7 +61,7 @@ class Parts(NamedTuple):
 def standing(march: EventDrivenMarch, setup: PieceSetup, end: Place, time: float) -> Standing | None:
     """End of a piece by a march; None where modes are not carried over."""
     library = march.library
-    if not isinstance(library, RetunedLibrary):
+    if not isinstance(library, RangeLibrary):
         return None
     return Standing(setup, library, end, march.constants, time)
 
@@ -82,7 +82,7 @@ def carried(
     """
     march.begin(setup, begun)
     library, mask = march.library, march.mask
-    assert isinstance(library, RetunedLibrary)
+    assert isinstance(library, RangeLibrary)
     was = before.library.eigenmodes(mask, *before.setup.places)
     now = library.eigenmodes(mask, *setup.places)
     if was is None or now is None:

@@ -1,4 +1,4 @@
-"""Ranges of speed over which contact modes are interpolated from three speeds (`followed_modes`).
+"""Ranges of speed over which contact modes are interpolated from three speeds (`mode_courses`).
 
 At both ends of a range, within it and at resonances the interpolated modes are compared with the matrices
 (`range_errors`). The error of held matrices is of first order in the range, that of interpolated modes of
@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rubhpc.integrate.changing_speed.acceleration_range import BY_ACCELERATION, LEAK, Judge
-from rubhpc.integrate.changing_speed.followed_modes import NODES, aligned, between
 from rubhpc.integrate.changing_speed.held_matrices import NARROWEST
+from rubhpc.integrate.changing_speed.mode_courses import NODES, aligned, between
 from rubhpc.integrate.changing_speed.range_errors import (
     PASSING,
     PLACES,

@@ -6,15 +6,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.changing_speed.followed_modes import EXACT, JUDGED, LEAST, Entries, between, shares_of
-from rubhpc.integrate.changing_speed.near_modes import most_of, weights
+from rubhpc.integrate.changing_speed.mode_courses import (
+    EXACT,
+    JUDGED,
+    LEAST,
+    Entries,
+    between,
+    most_of,
+    shares_of,
+    weights,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.changing_speed.followed_modes import Node
+    from rubhpc.integrate.changing_speed.mode_courses import Node
 
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
@@ -50,7 +58,7 @@ def entries(nodes: Sequence[Node], risen: Node | None) -> Entries:
     unit = np.eye(both.size)
 
     def turned(shares: Floats) -> Floats:
-        return (shares @ mixed.reshape(len(mixed), -1)).reshape(-1, *unit.shape) + unit
+        return np.tensordot(shares, mixed, axes=1) + unit
 
     back = np.linalg.inv(turned(shares[1:]))
     through = [unit, *back[: len(EXACT) - 1]]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rubhpc.integrate.case import march_of
 from rubhpc.integrate.changing_speed.carried_modes import Change, Standing, carried, standing
 from rubhpc.integrate.changing_speed.piece_setup import with_values
-from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary
+from rubhpc.integrate.changing_speed.range_library import RangeLibrary
 from rubhpc.integrate.changing_speed.stretch import Stretch, begin_stretch, take_stretch
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
@@ -191,7 +191,7 @@ class Passing:
     def _keep_fast(self, march: EventDrivenMarch, setup: PieceSetup, n_sample: int) -> None:
         """Let fast modes that follow the speed continue unchanged."""
         library = march.library
-        if self._left is not None and isinstance(library, RetunedLibrary) and library.follows(march.mask):
+        if self._left is not None and isinstance(library, RangeLibrary) and library.follows(march.mask):
             march.keep_fast(self._left, setup.spin, self._longer(setup, n_sample))
 
     def _pass(

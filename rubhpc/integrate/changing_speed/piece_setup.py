@@ -10,11 +10,10 @@ import numpy as np
 
 from rubhpc.fem.probes import probes_at, seen_at_rest
 from rubhpc.fem.statics import at_rest_under
-from rubhpc.integrate.changing_speed.followed_modes import between
-from rubhpc.integrate.changing_speed.retuned_curved import RetunedCurvedLibrary
-from rubhpc.integrate.changing_speed.retuned_laws import RetunedFrictionLibrary, RetunedPenaltyLibrary
-from rubhpc.integrate.changing_speed.retuned_modes import AT_ONCE, Desk, RetunedLibrary
-from rubhpc.integrate.changing_speed.retuned_soft_friction import RetunedSoftFrictionLibrary
+from rubhpc.integrate.changing_speed.mode_courses import between
+from rubhpc.integrate.changing_speed.range_curved import RangeCurvedLibrary
+from rubhpc.integrate.changing_speed.range_laws import RangeFrictionLibrary, RangePenaltyLibrary
+from rubhpc.integrate.changing_speed.range_library import AT_ONCE, RangeLibrary, TableBuffer
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.reduced_model.penalty_mode import Penalty
 from rubhpc.integrate.reduced_model.reduction import directions
@@ -33,12 +32,12 @@ if TYPE_CHECKING:
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
     from rubhpc.integrate.reduced_model.system_modes import Solved
     from rubhpc.kernels.contact_modes import Reduced
-    from rubhpc.kernels.retuning import Speeds
+    from rubhpc.kernels.filling import Speeds
 
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
 
-R = TypeVar("R", bound=RetunedLibrary)
+R = TypeVar("R", bound=RangeLibrary)
 D = TypeVar("D")
 
 
@@ -46,7 +45,7 @@ class HeldMatrices:
     """Matrices at a speed, rad/s, and an acceleration, rad/s^2, with their solved contact modes.
 
     `momentum` (n, n) is the change of the stiffness with the acceleration, per rad/s^2. `beside` are the
-    model and its matrices at other speeds of the range (`followed_modes.NODES`), through which they follow
+    model and its matrices at other speeds of the range (`mode_courses.NODES`), through which they follow
     the speed; none where they are constant. `judge` decides which accelerations they follow.
     """
 
@@ -64,23 +63,23 @@ class HeldMatrices:
         slope: float,
         reach: tuple[float, float],
         sample_level: int,
-        desks: dict[tuple[object, ...], Desk],
+        buffers: dict[tuple[object, ...], TableBuffer],
         beside: Sequence[tuple[Model, ReducedModel]] = (),
         judge: Judge | None = None,
     ) -> None:
         self._judge = judge
-        self._desks, self._beside = desks, beside
+        self._buffers, self._beside = buffers, beside
         self.model, self.reduced = model, reduced
         self.at_hand = reduced  # at the speed of the current piece
         self.twist = self.lean = np.zeros(model.sag.size)  # sag under 1 N m of a drive; under 1 rad/s^2
-        self.sagging_models: list[Model] = []  # at `followed_modes.NODES`, where the sag depends on the speed
+        self.sagging_models: list[Model] = []  # at `mode_courses.NODES`, where the sag depends on the speed
         self.kept = KeptParts()
         self.bodies: dict[float, Reduced] = {}  # of each friction, without what a piece changes
         self.sample_level = sample_level  # of the lowest speed
         self.acceleration, self.momentum = acceleration, momentum
         self._phasor, self._reach = phasor, reach
         self._slope = slope  # N m s, of a drive's torque over the speed
-        self._libraries: dict[tuple[str, float], RetunedLibrary] = {}
+        self._libraries: dict[tuple[str, float], RangeLibrary] = {}
         self._pairs: dict[float, FrictionPairs] = {}
         self._latest: tuple[tuple[float, ...], Model] | None = None  # by request
         self.first: tuple[tuple[float, ...], object] | None = None  # block of a case, by what was asked
@@ -145,7 +144,7 @@ class HeldMatrices:
 
     @cached_property
     def _at_nodes(self) -> dict[str, list[Floats]]:
-        """Arrays of the model that depend on the speed, at `followed_modes.NODES`."""
+        """Arrays of the model that depend on the speed, at `mode_courses.NODES`."""
         nodes = [self.reduced, *(reduced for _, reduced in self._beside)]
         return {name: [getattr(node, name) for node in nodes] for name in ("stiffness", "damping", "probe")}
 
@@ -186,7 +185,8 @@ class HeldMatrices:
                 tick=piece.tick,
                 sample_level=piece.sample_level,
                 n_level=piece.n_level,
-                desks=self._desks,
+                reach=self.reach,
+                buffers=self._buffers,
                 beside=[reduced for _, reduced in self._beside],
                 at_place=self.at_place,
                 risen=self.risen,
@@ -275,7 +275,7 @@ class PieceSetup(ModalSetup):
 
     def library(self, friction: float) -> ModeLibrary:
         """Contact modes of a friction, valid until another piece requests them."""
-        return self.held.tuned(RetunedLibrary, self, friction, dict)
+        return self.held.tuned(RangeLibrary, self, friction, dict)
 
     def curved_library(self, friction: float) -> CurvedLibrary:
         """The same with tables for curved gaps."""
@@ -285,7 +285,7 @@ class PieceSetup(ModalSetup):
             return {"at_piece": lambda: held.at_hand}
 
         held.at_hand = self.reduced
-        return held.tuned(RetunedCurvedLibrary, self, friction, at_piece)
+        return held.tuned(RangeCurvedLibrary, self, friction, at_piece)
 
     def penalty_library(self, friction: float) -> ModeLibrary:
         """The same under a penalty."""
@@ -295,7 +295,7 @@ class PieceSetup(ModalSetup):
             law = self.law
             return {"penalty": Penalty(law.stiffness, law.damping, gap_jacobian, force_direction)}
 
-        return self.held.tuned(RetunedPenaltyLibrary, self, friction, penalty)
+        return self.held.tuned(RangePenaltyLibrary, self, friction, penalty)
 
     def friction_pairs(self, friction: float) -> FrictionPairs:
         """The pairs of a friction."""
@@ -311,8 +311,7 @@ class PieceSetup(ModalSetup):
             rim_speed = radius * abs(self.held.reduced.spin)
             return {"pairs": replace(self.friction_pairs(friction), rim_speed=rim_speed)}
 
-        kind = RetunedSoftFrictionLibrary if self.law.stiffness else RetunedFrictionLibrary
-        return self.held.tuned(kind, self, friction, pairs)
+        return self.held.tuned(RangeFrictionLibrary, self, friction, pairs)
 
 
 def with_values(instance: D, **values: Any) -> D:

@@ -10,7 +10,7 @@ import numpy as np
 
 from rubhpc.integrate.changing_speed.block import Block
 from rubhpc.integrate.changing_speed.mode_parts import speeds_of
-from rubhpc.integrate.changing_speed.retuned_modes import AT_ONCE
+from rubhpc.integrate.changing_speed.range_library import AT_ONCE
 from rubhpc.integrate.changing_speed.ripples import Ripples
 from rubhpc.integrate.changing_speed.speed_ranges import SpeedRanges
 

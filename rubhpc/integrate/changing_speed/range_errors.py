@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rubhpc.integrate.changing_speed.followed_modes import EQUAL, EXACT, JUDGED, between
+from rubhpc.integrate.changing_speed.mode_courses import EQUAL, EXACT, JUDGED, between
 
 if TYPE_CHECKING:
     from collections.abc import Callable

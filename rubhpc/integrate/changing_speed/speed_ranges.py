@@ -11,7 +11,6 @@ import numpy as np
 from rubhpc.fem.free_spin import unit_rotation
 from rubhpc.fem.probes import probes_at
 from rubhpc.fem.statics import at_rest_under, sag_under
-from rubhpc.integrate.changing_speed.followed_modes import NODES
 from rubhpc.integrate.changing_speed.followed_range import followed_reach, rotor_of
 from rubhpc.integrate.changing_speed.held_matrices import (
     NARROWEST,
@@ -19,6 +18,7 @@ from rubhpc.integrate.changing_speed.held_matrices import (
     WIDEST_TABULATED,
     held_range,
 )
+from rubhpc.integrate.changing_speed.mode_courses import NODES
 from rubhpc.integrate.changing_speed.mode_parts import speeds_of
 from rubhpc.integrate.changing_speed.piece_setup import HeldMatrices, PieceSetup, sagging
 from rubhpc.integrate.changing_speed.ripples import Linear
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from rubhpc.fem.model import Model
     from rubhpc.integrate.changing_speed.acceleration_range import Judge
     from rubhpc.integrate.changing_speed.followed_range import Reach
-    from rubhpc.integrate.changing_speed.retuned_modes import Desk
+    from rubhpc.integrate.changing_speed.range_library import TableBuffer
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
 
@@ -40,7 +40,7 @@ SPEED_STEP = 1e-3  # relative, over which the change of the matrices with the sp
 LONGEST_FALL = 1.0 / 3.0  # half of the range over the first speed of a coast-down, which stays above 0
 DRIVEN_SHARE = 0.25  # of the accuracy, of matrices of a driven rotor, whose twist errs most
 
-_DESKS: WeakKeyDictionary[ModalSetup, dict[tuple[object, ...], Desk]] = WeakKeyDictionary()
+_BUFFERS: WeakKeyDictionary[ModalSetup, dict[tuple[object, ...], TableBuffer]] = WeakKeyDictionary()
 
 
 class SpeedRanges:
@@ -96,10 +96,10 @@ class SpeedRanges:
         near_end = reach * (1.0 + 1e-9)  # rounding apart
         slowest = replace(fastest, spin=abs(speed) - reach)
         ranges = near_end, swing
-        desks = _DESKS.setdefault(fastest, {})
+        buffers = _BUFFERS.setdefault(fastest, {})
         at = acceleration, slope, ranges
         held = HeldMatrices(
-            model, reduced, self.phasor, self._momentum, *at, slowest.sample_level, desks, beside, judge
+            model, reduced, self.phasor, self._momentum, *at, slowest.sample_level, buffers, beside, judge
         )
         held.is_balanced = not is_followed
         if free is not None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from test_retuned_modes import LAWS, setup
 
-from rubhpc.integrate.changing_speed.followed_modes import NODES
+from rubhpc.integrate.changing_speed.mode_courses import NODES
 from rubhpc.integrate.changing_speed.mode_parts import speeds_of
 from rubhpc.kernels.contact_modes import enter, enter_rest
 
@@ -77,6 +77,7 @@ def library_of(base, law, at, *, is_risen=False):
         tick=base.tick,
         sample_level=base.sample_level,
         n_level=base._n_level,
+        reach=REACH,
         **law.keys(base),
         beside=[at(place) for place in NODES[1:]],
         at_place=at,

@@ -9,10 +9,9 @@ from trial_rig import trial_rig
 from rubhpc.case_arguments import case_of, read_probes
 from rubhpc.integrate.changing_speed.held_matrices import held_range
 from rubhpc.integrate.changing_speed.mode_parts import speeds_of
-from rubhpc.integrate.changing_speed.retuned_curved import RetunedCurvedLibrary
-from rubhpc.integrate.changing_speed.retuned_laws import RetunedFrictionLibrary, RetunedPenaltyLibrary
-from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary
-from rubhpc.integrate.changing_speed.retuned_soft_friction import RetunedSoftFrictionLibrary
+from rubhpc.integrate.changing_speed.range_curved import RangeCurvedLibrary
+from rubhpc.integrate.changing_speed.range_laws import RangeFrictionLibrary, RangePenaltyLibrary
+from rubhpc.integrate.changing_speed.range_library import RangeLibrary
 from rubhpc.integrate.reduced_model.contact_mode import solve_contact_mode
 from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
 from rubhpc.integrate.reduced_model.energy_forms import energies_of
@@ -50,7 +49,7 @@ def measured(mode, reduced, slip, friction, *, width, **levels):
 class Sliding:
     """Gaps closed by multipliers, steady sliding."""
 
-    kind, masks = RetunedLibrary, {1: (0, 1), 3: (0, 2, 5)}
+    kind, masks = RangeLibrary, {1: (0, 1), 3: (0, 2, 5)}
 
     def keys(self, base):
         return {}
@@ -74,7 +73,7 @@ STATES = {
 class Sticking:
     """Pairs that slide in either sense or stick."""
 
-    kind = RetunedFrictionLibrary
+    kind = RangeFrictionLibrary
     masks = STATES
 
     def pairs(self, base, spin):
@@ -94,7 +93,7 @@ class Sticking:
 class Springs:
     """Pairs that press, by spring and damper, or are lifted."""
 
-    kind, masks = RetunedPenaltyLibrary, {1: (0, 1, 2), 3: (0, 0b001_101, 0b011)}
+    kind, masks = RangePenaltyLibrary, {1: (0, 1, 2), 3: (0, 0b001_101, 0b011)}
 
     def keys(self, base):
         gap, force, _ = directions(base.reduced, base.model, 0.2)
@@ -114,7 +113,7 @@ class Springs:
 class StickingSprings(Sticking):
     """Friction with stick where springs and dampers press; the last bits are those of lifted pairs."""
 
-    kind = RetunedSoftFrictionLibrary
+    kind = RangeFrictionLibrary
     masks = STATES | {1: (*STATES[1], 1 << lifted_place(1, 0))}
 
     def pairs(self, base, spin):
@@ -146,6 +145,7 @@ def test_a_tuned_mode_is_the_mode_at_that_speed(q, law):
         phasor=phasor,
         known={},
         tick=base.tick,
+        reach=40.0,
         **levels,
         **law.keys(base),
     )
@@ -154,12 +154,12 @@ def test_a_tuned_mode_is_the_mode_at_that_speed(q, law):
     spin, tick = 231.0, 0.9 * base.tick
     factor = (spin**2 - 40.0j) * np.exp(0.7j)
     columns = [170.0, spin], [0.5 + 0.3j, factor], [3.0, 0.0], [base.tick, tick]
-    speeds = speeds_of(*columns, base.spin, base.sample_level)
+    speeds = speeds_of(*columns, base.spin, base.sample_level, 40.0)
     library.tune(speeds, 0)
     for mask in masks:  # the next speed is tuned with this one where there is room
         library.add(mask)
     assert library.n_room > 1 or q > 1
-    assert (library.tuned(set(masks)) >= 0).sum() == min(2, library.n_room) * len(masks)
+    assert (library.filled(set(masks)) >= 0).sum() == min(2, library.n_room) * len(masks)
     library.tune(speeds, 1)
     assert not any(mask >= 0 for mask in library.masks)  # they wait until they are met
     force = np.stack([(phasor * factor).real, -(phasor * factor).imag])
@@ -223,7 +223,7 @@ def test_tables_of_curved_gaps_are_those_at_that_speed(q):
     reduced = replace(base.reduced, spin=spin, force=force)
     levels = {"known": {}, "sample_level": base.sample_level, "n_level": base._n_level}
     case = base.model, 0.2
-    library = RetunedCurvedLibrary(
+    library = RangeCurvedLibrary(
         base.reduced, *case, phasor=phasor, at_piece=lambda: reduced, tick=base.tick, **levels
     )
     for mask in Sliding.masks[q]:

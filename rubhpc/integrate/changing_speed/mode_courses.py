@@ -1,10 +1,9 @@
-"""Contact modes that follow the speed: polynomials through those of three speeds in a range.
+"""Contact modes over a range of speeds: polynomials through those of three speeds.
 
 Eigenvectors of the speeds at either side are brought to the length and phase that those in the middle see as
-theirs (`near_modes`), so that exponents, shapes, their inverse and what is made of them go smoothly:
-parabolas follow them, with errors of the third order in the range. The inverse has to be their inverse, or
-each event would lose or gain motion: it is exact at seven places, and goes through these by polynomials of
-the sixth order. With the
+theirs, so that exponents, shapes, their inverse and what is made of them go smoothly: parabolas follow them,
+with errors of the third order in the range. The inverse has to be their inverse, or each event would lose or
+gain motion: it is exact at seven places, and goes through these by polynomials of the sixth order. With the
 acceleration, which changes the matrices little, all of it goes evenly: from that in the middle to that of
 another acceleration there.
 """
@@ -18,14 +17,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.integrate.changing_speed.near_modes import weights
-from rubhpc.kernels.varying import Course, Varying
+from rubhpc.integrate.reduced_model.energy_forms import growth_of
+from rubhpc.kernels.courses import Course, Courses
+from rubhpc.kernels.filling import ModeCourse
+from rubhpc.kernels.filling_energies import Losses
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode
-    from rubhpc.kernels.retuning import HeldMode
+    from rubhpc.kernels.contact_modes import ModeTables
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -39,36 +40,33 @@ EXACT = 0.0, *(sign * math.cos(k * math.pi / 14.0) for k in (5, 3, 1) for sign i
 POWERS = {len(places): np.linalg.inv(np.vander(places, increasing=True)) for places in (NODES, EXACT)}
 JUDGED = -1.0, -0.62, 0.62, 1.0  # places between those, at which the inverse is judged
 MOST_LOST = 1e-4  # share of a mode in another, beyond which modes go with the speed too fast
+_BY_COORDINATES = "exponent", "row", "resisting_re", "resisting_im"  # that have a response
 FAR = 0.5  # share of a mode in another of a speed beside it, over its own, from which it is not the same
 EQUAL = 1e-9  # relative difference of two exponents that repeat
 STILL, LEAST = 1e-13, 1e-16  # change of an entry over it, and over the greatest, below which it stays
 NONE = Course(np.zeros(0, dtype=np.int64), np.zeros((1, 0)), np.zeros(0))
-NOTHING = Varying(np.zeros(0), *[NONE] * (len(Varying._fields) - 1))
-_TABLES = "motion", "switch", "slip"
-_HELD = "exponent", "switch", "output", "row"
-_OF_RIM = "motion", "switch", "fixed", "rate", "row"
-_RIM = "rim "
+NOTHING = Courses(np.zeros(0), *[NONE] * (len(Courses._fields) - 1))
 
 
 class Node(NamedTuple):
-    """A contact mode of one speed, and what of it and of its tables goes with the speed."""
+    """A contact mode of one speed with its tables; coordinates are padded to their width."""
 
     mode: ContactMode
-    held: HeldMode
-    motion: Complexes  # (2 n, width)
-    switch: Complexes  # (r, width)
-    slip: Complexes  # (q, width)
+    row: ModeTables  # (1, ...) each
+    exponent: Complexes  # (width,), 1/s
+    output: Floats  # (o, 3 n), what output rows see of displacements, rates and accelerations
+    seen: Complexes  # (o, width), what they see of coordinates
+    resisting: Complexes  # (n, width), resisting forces; (0, width) where no energies are asked for
 
     @classmethod
-    def of(cls, mode: ContactMode, held: HeldMode, slip: Floats) -> Node:
-        """That of a mode; `slip` (q, n) are slip speeds with the motion."""
-        end, n = mode.exponent.size, slip.shape[1]
-        motion, switch, slipping = (
-            np.zeros((rows, held.exponent.size), dtype=np.complex128)
-            for rows in (2 * n, len(mode.switch), len(slip))
-        )
-        motion[:, :end], switch[:, :end], slipping[:, :end] = mode.motion, mode.switch, slip @ mode.motion[n:]
-        return cls(mode, held, motion, switch, slipping)
+    def of(cls, mode: ContactMode, row: ModeTables, output: Floats, resisting: Complexes) -> Node:
+        """That of a mode and its tables; `resisting` may have fewer coordinates."""
+        motion = row.motion_re[0] + 1j * row.motion_im[0]
+        n, end, width = len(motion) // 2, mode.exponent.size, motion.shape[1]
+        exponent = np.pad(mode.exponent, (0, width - end))
+        position, velocity, acceleration = np.hsplit(output, 3)
+        seen = position @ motion[:n] + velocity @ motion[n:] + (acceleration @ motion[n:]) * exponent
+        return cls(mode, row, exponent, output, seen, np.pad(resisting, ((0, 0), (0, width - end))))
 
 
 def between(values: Sequence[A], place: float) -> A:
@@ -138,50 +136,129 @@ def aligned(seen: Complexes, exponent: Complexes) -> tuple[NDArray[np.int64], Co
     return place, turn
 
 
-def followed(nodes: Sequence[Node], risen: Node | None, entered: Entries, seen: Complexes) -> HeldMode:
-    """What is held of the mode in the middle, with what of it goes with the speed and its acceleration.
+def weights(mode: ContactMode) -> Floats:
+    """2 for modes that stand for a conjugate pair, 1 for others."""
+    m = mode.n_eigenmode
+    own = np.einsum("ka,ak->k", mode.enter[:m], mode.motion[:, :m]).real
+    return np.where(own > 1.5, 2.0, 1.0)
 
-    `nodes` are those at `NODES`, the middle first; `risen` is that in the middle at another
-    acceleration, if any; `entered` is what enters them (`entries`), `seen` (n,) what constraints leave of
-    the unbalance.
+
+def constant_course(
+    node: Node,
+    phasor: Complexes,
+    *,
+    n_ahead: int,
+    spring: float = 0.0,
+    gap: Floats,
+    clearance: Sequence[int] = (),
+) -> ModeCourse:
+    """A mode whose eigenmodes stay what they are.
+
+    What drives them follows from the response to the unbalance at the speed for which the mode is solved.
+
+    Parameters
+    ----------
+    phasor : (n,), kg m
+        Unbalance at unit speed.
+    n_ahead : int
+        Samples that are read from one set of coordinates.
+    spring : float, N/m
+        Stiffness of pressed springs, with `gap` (k, n) by reduced displacements and pairs `clearance`.
+    """
+    mode, m = node.mode, node.mode.n_eigenmode
+    exponent, turning, is_pair = mode.exponent[:m], mode.exponent[m], weights(mode) > 1.5
+    direct, other = mode.take_off[0, :m] - 1j * mode.take_off[1, :m], mode.take_off[0] + 1j * mode.take_off[1]
+    mirrored, force = other[:m].conj(), abs(turning) ** 2
+    growing, switch = growth_of(mode), mode.switch
+    rubbed = node.resisting[:, m] - _response(node.resisting[:, :m], direct, mirrored, is_pair)
+    return ModeCourse(
+        n_coordinate=mode.exponent.size,
+        n_ahead=n_ahead,
+        exponent=node.exponent.copy(),
+        is_pair=is_pair,
+        drive=direct * (turning - exponent) / force,
+        mirrored_drive=mirrored * (turning - exponent.conj()) / force,
+        reaction=(_response(switch[:, :m], direct, mirrored, is_pair) - switch[:, m]) / force,
+        phasor=phasor,
+        output=node.output,
+        row=node.seen,
+        losses=Losses(
+            resisting_re=node.resisting.real.copy(),
+            resisting_im=node.resisting.imag.copy(),
+            rubbed=rubbed / force,
+            half=0.5 * spring,
+            gap=np.ascontiguousarray(gap),
+            clearance=m + 1 + np.array(clearance, dtype=np.int64),
+            one=growing.steady,
+            growing=growing.which,
+            speed=growing.speed,
+        ),
+        courses=NOTHING,
+    )
+
+
+def followed(course: ModeCourse, nodes: Sequence[Node], risen: Node | None, entered: Entries) -> ModeCourse:
+    """The same mode with what of it goes with the speed and its acceleration.
+
+    `nodes` are those at `NODES`, the middle first; `risen` is that in the middle at another acceleration, if
+    any; `entered` is what enters them (`entries`).
     """
     middle, mode = nodes[0], nodes[0].mode
-    held, m, n = middle.held, mode.n_eigenmode, seen.size
+    m, n, width = mode.n_eigenmode, len(mode.motion) // 2, middle.exponent.size
     of_all, n_node = [*nodes, *([risen] if risen else [])], len(nodes)
     courses = {}
-    for name in _TABLES:
-        values = np.array([getattr(node, name) for node in of_all])
-        courses[name + "_re"] = _through(values.real, m, n_node)
-        courses[name + "_im"] = _through(values.imag, m, n_node)
+    for name, n_kept in (("motion", 1), ("switch", 1), ("slip", 1), ("rate", m + 1)):
+        for part in ("_re", "_im"):
+            values: Any = np.array([getattr(node.row, name + part)[0] for node in of_all])
+            courses[name + part] = _through(values, n_node, range(m + 1 - n_kept, m + 1))
     enter, take_off = entered.enter, entered.take_off
-    padded = np.zeros((len(enter), *middle.motion.shape), dtype=np.complex128)
+    padded: Complexes = np.zeros((len(enter), *middle.row.motion_re[0].shape), dtype=np.complex128)
     padded[:, :, :m] = enter.transpose(0, 2, 1)
-    constant = np.zeros((len(enter), take_off.shape[1], 2, middle.motion.shape[1]))
+    constant = np.zeros((len(enter), take_off.shape[1], 2, width))
     constant[..., 0, :m], constant[..., 1, :m] = take_off.real, take_off.imag
-    for name, values in (("enter_re", padded.real), ("enter_im", padded.imag), ("enter_constant", constant)):
-        courses[name] = _through(values, m, len(EXACT), skips_response=False)
-    shape: dict[str, Any] = {name: [getattr(node.held, name) for node in of_all] for name in _HELD}
-    entry: dict[str, Any] = {
-        "drive": enter[:, :, n:] @ seen,
-        "mirrored_drive": enter[:, :, n:].conj() @ seen,
+    of_entry = {"enter_re": padded.real, "enter_im": padded.imag, "enter_constant": constant}
+    courses |= {name: _through(values, len(EXACT)) for name, values in of_entry.items()}
+    loss = np.array([node.row.loss[0] for node in of_all])
+    both = [m, width + m][: len(loss[0])]
+    loss[1:, both] = loss[0][both]
+    courses["loss"] = _through(loss, n_node, both)
+    impulse = _response(mode.motion[n:, :m], course.drive, course.mirrored_drive, course.is_pair)
+    shape: dict[str, Any] = {
+        "exponent": [node.exponent for node in of_all],
+        "output": [node.output for node in of_all],
+        "row": [node.seen for node in of_all],
     }
-    if held.rim.one >= 0:
-        shape |= {_RIM + name: [getattr(node.held.rim, name) for node in of_all] for name in _OF_RIM}
-        entry[_RIM + "entered"] = constant[:, -1, 0] + 1j * constant[:, -1, 1]
+    if middle.resisting.size:
+        shape["resisting_re"] = [node.resisting.real for node in of_all]
+        shape["resisting_im"] = [node.resisting.imag for node in of_all]
+        shape["speed"] = [growth_of(node.mode).speed for node in of_all]
+    entry = {"drive": enter[:, :, n:] @ impulse, "mirrored_drive": enter[:, :, n:].conj() @ impulse}
     kept, views, places = _room({name: values[0] for name, values in (shape | entry).items()})
 
     def moved(arrays: dict[str, Any], count: int) -> Course:
         found = []
         for name, values in arrays.items():
-            course = _through(values, m, count, skips_response=name in ("exponent", "row"))
-            found.append(course._replace(at=course.at + places[name]))
+            of_course = _through(values, count, [m] if name in _BY_COORDINATES else [])
+            found.append(of_course._replace(at=of_course.at + places[name]))
         return _joined(found)
 
     shapes, entries = moved(shape, n_node), moved(entry, len(EXACT))
-    varying = Varying(kept=kept, kept_shape=shapes, kept_entry=entries, **courses)
-    rim = {name.removeprefix(_RIM): view for name, view in views.items() if name.startswith(_RIM)}
-    own = {name: view for name, view in views.items() if not name.startswith(_RIM)}
-    return held._replace(**own, rim=held.rim._replace(**rim), varying=varying)
+    of_losses = {name: views.pop(name) for name in Losses._fields if name in views}
+    return course._replace(
+        **views,
+        losses=course.losses._replace(**of_losses),
+        courses=Courses(kept=kept, kept_shape=shapes, kept_entry=entries, **courses),
+    )
+
+
+def _response(
+    rows: Complexes, direct: Complexes, mirrored: Complexes, is_pair: NDArray[np.bool_]
+) -> Complexes:
+    """What rows (r, m) see of a response with these shares (m,) of eigenmodes and of their conjugates."""
+    of_real = np.where(is_pair, 0.5 * (direct + mirrored), direct)
+    of_imaginary = np.where(is_pair, 0.5j * (direct - mirrored), 1j * direct)
+    found: Complexes = (rows.real @ of_real + rows.imag @ of_imaginary).astype(np.complex128)
+    return found
 
 
 def taken(course: Course, values: Floats, place: float, rise: float) -> Floats:
@@ -214,15 +291,14 @@ def shares_of(place: float, count: int) -> Floats:
     return shares
 
 
-def _through(values: Any, m: int, n_node: int, *, skips_response: bool = True) -> Course:
+def _through(values: Any, n_node: int, kept: Sequence[int] = ()) -> Course:
     """What goes through the first `n_node` arrays, and to that at another acceleration if there is one more.
 
-    The response to unbalance, m, is left out.
+    Coordinates `kept`, of the last axis, stay as in the first array.
     """
     values = np.array(values)  # a copy
     values[1:] -= values[0]
-    if skips_response and values.ndim > 1 and values.shape[-1] > m:
-        values[1:, ..., m] = 0.0
+    values[1:, ..., list(kept)] = 0.0
     flat = values.view(np.float64).reshape(len(values), -1)
     size = np.abs(flat[1:]).max(axis=0, initial=0.0)
     at = np.flatnonzero(size > np.maximum(STILL * np.abs(flat[0]), LEAST * size.max(initial=0.0)))
@@ -247,3 +323,9 @@ def _room(arrays: dict[str, Any]) -> tuple[Floats, dict[str, Any], dict[str, int
         view[:] = value
         views[name], places[name] = view, int(first)
     return memory, views, places
+
+
+def most_of(values: Floats | Complexes) -> float:
+    """The largest real or imaginary part, without a root for each value."""
+    parts = values.view(np.float64)
+    return float(max(parts.max(initial=0.0), -parts.min(initial=0.0)))

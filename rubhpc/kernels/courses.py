@@ -26,21 +26,24 @@ class Course(NamedTuple):
     rise: Floats  # (k,), factors of the place of the acceleration
 
 
-class Varying(NamedTuple):
-    """What of a mode goes with the speed; none of it where matrices are held."""
+class Courses(NamedTuple):
+    """What of a mode goes with the speed; none of it where nothing does."""
 
-    kept: Floats  # (s,), the memory of what `HeldMode` has of it
+    kept: Floats  # (s,), the memory of what `filling.ModeCourse` has of it
     kept_shape: Course
     kept_entry: Course
     motion_re: Course  # of the tables, as those that follow
     motion_im: Course
     switch_re: Course
     switch_im: Course
+    rate_re: Course  # but for those of eigenmodes and the response
+    rate_im: Course
     slip_re: Course
     slip_im: Course
     enter_re: Course
     enter_im: Course
     enter_constant: Course
+    loss: Course
 
 
 @jit
@@ -66,23 +69,26 @@ def take_course(course: Course, place: float, rise: float, values: Floats) -> No
 
 
 @jit
-def vary(tables: ModeTables, mode: int, varying: Varying, place: float, rise: float) -> None:
+def follow(tables: ModeTables, mode: int, courses: Courses, place: float, rise: float) -> None:
     """Bring a mode and its tables to a place in the range, but for what follows from these."""
-    take_course(varying.kept_shape, place, rise, varying.kept)
-    take_course(varying.kept_entry, place, rise, varying.kept)
-    take_course(varying.motion_re, place, rise, tables.motion_re[mode].reshape(-1))
-    take_course(varying.motion_im, place, rise, tables.motion_im[mode].reshape(-1))
-    take_course(varying.switch_re, place, rise, tables.switch_re[mode].reshape(-1))
-    take_course(varying.switch_im, place, rise, tables.switch_im[mode].reshape(-1))
-    take_course(varying.slip_re, place, rise, tables.slip_re[mode].reshape(-1))
-    take_course(varying.slip_im, place, rise, tables.slip_im[mode].reshape(-1))
-    take_course(varying.enter_re, place, rise, tables.enter_re[mode].reshape(-1))
-    take_course(varying.enter_im, place, rise, tables.enter_im[mode].reshape(-1))
-    take_course(varying.enter_constant, place, rise, tables.enter_constant[mode].reshape(-1))
+    take_course(courses.kept_shape, place, rise, courses.kept)
+    take_course(courses.kept_entry, place, rise, courses.kept)
+    take_course(courses.motion_re, place, rise, tables.motion_re[mode].reshape(-1))
+    take_course(courses.motion_im, place, rise, tables.motion_im[mode].reshape(-1))
+    take_course(courses.switch_re, place, rise, tables.switch_re[mode].reshape(-1))
+    take_course(courses.switch_im, place, rise, tables.switch_im[mode].reshape(-1))
+    take_course(courses.rate_re, place, rise, tables.rate_re[mode].reshape(-1))
+    take_course(courses.rate_im, place, rise, tables.rate_im[mode].reshape(-1))
+    take_course(courses.slip_re, place, rise, tables.slip_re[mode].reshape(-1))
+    take_course(courses.slip_im, place, rise, tables.slip_im[mode].reshape(-1))
+    take_course(courses.enter_re, place, rise, tables.enter_re[mode].reshape(-1))
+    take_course(courses.enter_im, place, rise, tables.enter_im[mode].reshape(-1))
+    take_course(courses.enter_constant, place, rise, tables.enter_constant[mode].reshape(-1))
+    take_course(courses.loss, place, rise, tables.loss[mode].reshape(-1))
 
 
 @jit
-def vary_rates(tables: ModeTables, mode: int, exponent: Complexes, n_eigenmode: int) -> None:
+def follow_rates(tables: ModeTables, mode: int, exponent: Complexes, n_eigenmode: int) -> None:
     """Rates of what eigenmodes make of switch functions and slip, as their exponents are."""
     inverse = np.zeros(n_eigenmode if tables.primitive_re.shape[1] > 0 else 0, dtype=np.complex128)
     for k in range(inverse.size):
