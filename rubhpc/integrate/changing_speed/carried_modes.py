@@ -1,6 +1,6 @@
-"""Higher modes across a change of the held matrices, without artificial ringing.
+"""Higher modes from one range of speeds to the next, or to another acceleration, without artificial ringing.
 
-The quasi-static response of a fast mode changes gradually with the speed, but held matrices change at once.
+The quasi-static response of a fast mode changes gradually with the speed, but the modes of two ranges differ.
 In the modes `l` of the next matrices, a motion `exp(m t)` that continued unchanged would excite each mode. A
 linear change from the time `-a` before to `b` after excites it by the mean of `exp((m - l) s)` over these
 times, which is 1 for slow motions and vanishes for fast ones. Powers of its modulus represent a change that
@@ -27,8 +27,6 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 LOWEST = 3.0  # frequency of a mode over the spin; lower modes take part in contact
-# The same of what has not touched and rings long: its damping over its frequency.
-LOWEST_RINGING, RINGING = 1.5, 0.1
 TOUCH = 0.25  # revolutions, at most, before and after a change in motions with contact
 SLOW = 1e-6  # exponent times time, below which a change is immediate
 
@@ -44,9 +42,8 @@ class Standing(NamedTuple):
 
 
 class Change(NamedTuple):
-    """How the speed changes where matrices do."""
+    """How the speed changes where a range ends."""
 
-    held_for: float  # s, since when the matrices before were held
     ahead: float  # s, duration of the next piece
     jump: float = 0.0  # rad/s^2, sudden change of the acceleration
 
@@ -97,13 +94,11 @@ def carried(
         np.column_stack([was.motion * z, still, forced]),
     )
     has_touched = any(march.met)
-    size, spin = np.abs(now.exponent.imag), abs(setup.spin)
-    is_followed = before.setup.held.is_followed and setup.held.is_followed
-    fast = size > LOWEST * spin
-    if is_followed and not change.jump:  # as from piece to piece
+    spin = abs(setup.spin)
+    if change.jump:
+        fast = np.abs(now.exponent.imag) > LOWEST * spin
+    else:  # as from piece to piece
         fast = np.abs(now.exponent) > max(FAST * spin, QUICK / max(before.time, change.ahead))
-    elif not is_followed and not has_touched:
-        fast |= (size > LOWEST_RINGING * spin) & (np.abs(now.exponent.real) < RINGING * size)
     exponent, enter = now.exponent[fast], now.enter[fast]
     left = 0.5 * np.stack([enter @ parts.shape, enter @ parts.shape.conj()])  # (2, modes, parts)
     direct, mirrored = now.forced(old, factor)
@@ -115,9 +110,9 @@ def carried(
         slow = np.append(np.abs(was.exponent) <= LOWEST * spin, [True, True])
         pushing = Parts(parts.exponent[slow], parts.shape[:, slow])
         real[..., slow] = _pushed(pushing, exponent, enter, change.jump * setup.held.momentum)
-    longest = TOUCH * 2.0 * np.pi / spin if mask else np.inf
-    spans = np.minimum(_spans(before, setup, change), longest)
-    taken = 1.0 - left_over(_apart(parts, exponent), *spans, has_touched=has_touched)
+    # The speed changes evenly: a revolution before and after parts slow from fast.
+    span = (TOUCH if mask else 1.0) * 2.0 * np.pi / spin
+    taken = 1.0 - left_over(_apart(parts, exponent), span, has_touched=has_touched)
     if has_touched:
         taken[..., :-2] *= np.abs(was.exponent) <= LOWEST * spin
     off = -((left - real) * taken).sum(axis=(0, 2))
@@ -125,37 +120,17 @@ def carried(
     return Place(motion, setup.model.sag, begun.contact_force)
 
 
-def left_over(exponent: Complexes, before: float, after: float, *, has_touched: bool) -> Complexes:
-    """Factor of a gradual change from a time before, s, to one after, relative to a sudden one.
+def left_over(exponent: Complexes, span: float, *, has_touched: bool) -> Complexes:
+    """Factor of a gradual change from a time before to as long after, s, relative to a sudden one.
 
     `exponent` (1/s) is that of the motion minus that of the excited mode.
     """
-    whole = 0.5 * (before + after)
-    x = exponent * whole
+    x = exponent * span
     x = np.where(np.abs(x) < SLOW, SLOW, x)
     dying = 2.0 * np.abs(x.real)
     mean = (np.exp(x - dying) - np.exp(-x - dying)) / (2.0 * x)
-    smooth = mean**3 if has_touched else np.where(np.abs(x.imag) < np.pi, mean, mean**2)
-    turned: Complexes = smooth * np.exp(0.5j * exponent.imag * (after - before))
-    return turned
-
-
-def _spans(before: Standing, new: PieceSetup, change: Change) -> tuple[float, float]:
-    """Times, s, since the speed of the previous matrices, and until that of the next ones.
-
-    Matrices that follow the speed change evenly: a revolution before and after parts slow from fast.
-    """
-    old = before.setup
-    if old.held.is_followed and new.held.is_followed:
-        turn = 2.0 * np.pi / abs(new.spin)
-        return turn, turn
-    speed = 0.5 * (old.spin + new.spin)
-    since, until = (
-        abs((speed - of.held.reduced.spin) / of.held.acceleration) if of.held.acceleration else 0.0
-        for of in (old, new)
-    )
-    since = min(since, change.held_for)
-    return since, min(until, change.ahead if change.jump else max(since, change.ahead))
+    smooth: Complexes = mean**3 if has_touched else np.where(np.abs(x.imag) < np.pi, mean, mean**2)
+    return smooth
 
 
 def _pushed(parts: Parts, exponent: Complexes, enter: Complexes, stiffness: Floats) -> Complexes:

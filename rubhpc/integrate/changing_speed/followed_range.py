@@ -1,8 +1,7 @@
 """Ranges of speed over which contact modes are interpolated from three speeds (`mode_courses`).
 
 At both ends of a range, within it and at resonances the interpolated modes are compared with the matrices
-(`range_errors`). The error of held matrices is of first order in the range, that of interpolated modes of
-third order.
+(`range_errors`). Their errors are of the third order in the range.
 """
 
 from __future__ import annotations
@@ -13,7 +12,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rubhpc.integrate.changing_speed.acceleration_range import BY_ACCELERATION, LEAK, Judge
-from rubhpc.integrate.changing_speed.held_matrices import NARROWEST
 from rubhpc.integrate.changing_speed.mode_courses import NODES, aligned, between
 from rubhpc.integrate.changing_speed.range_errors import (
     PASSING,
@@ -41,6 +39,7 @@ if TYPE_CHECKING:
     Ints = NDArray[np.int64]
     Complexes = NDArray[np.complex128]
 
+NARROWEST = 1e-4  # half of the range over the speed
 AT_ENDS = 0.5  # error at the ends of a range over the accuracy; inside it is smaller
 SAFE = 0.9  # share of the widest accurate range
 LEAST, MOST = 0.5, 0.85  # factors by which a range shrinks
@@ -74,11 +73,12 @@ def followed_reach(
     momentum: Floats,
     widest: float,
     *,
+    sense: float,
     accuracy: float,
     others: tuple[float, float],
     guess: float | None = None,
 ) -> Reach:
-    """The widest range that begins at a speed (rad/s), in the direction of the acceleration.
+    """The widest range that begins at a speed (rad/s), or is about it.
 
     Parameters
     ----------
@@ -87,6 +87,8 @@ def followed_reach(
         Change of the stiffness with the acceleration, per rad/s^2.
     widest : float, rad/s
         Half of the range, at most.
+    sense : float
+        1 where the speed rises from there, -1 where it falls, 0 where it is in the middle.
     accuracy : float
         Relative error of each signal at the ends of the range of accelerations; half of it by the speed.
     others : (float, float), rad/s^2
@@ -94,7 +96,6 @@ def followed_reach(
     guess : float, optional, rad/s
         Half of the range tried first; by default the widest.
     """
-    sense = float(np.sign(acceleration))
     part = _part(rotor, speed, speed + (sense or 1.0) * widest)
     if not part.size:
         return Reach(widest, _swing(rotor, speed, momentum, accuracy))

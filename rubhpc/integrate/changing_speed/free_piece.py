@@ -12,7 +12,7 @@ from rubhpc.integrate.changing_speed.carried_modes import Change
 from rubhpc.integrate.changing_speed.last_turn import LastTurn
 from rubhpc.integrate.changing_speed.passing import Passed, Passing, energy_of, state_at
 from rubhpc.integrate.changing_speed.pieces import Pieces
-from rubhpc.integrate.changing_speed.twist_ramp import TwistRamp
+from rubhpc.integrate.changing_speed.twist_ramp import TwistRamp, sag_ramp
 from rubhpc.integrate.marches.modal import Place
 from rubhpc.integrate.measuring.samples import lift_samples, new_accumulator
 from rubhpc.integrate.start import start_of
@@ -89,7 +89,7 @@ class Spin:
         self._begun: State | Place | None = None
         self._setup: PieceSetup | None = None  # of the last piece
         self._standing: Standing | None = None  # where it has ended
-        self._held_from = 0.0  # s, since when its matrices are held
+        self._left = self._passing.left  # where it has ended, in modal coordinates
         # The contact forces of the piece before, and how long it took, s.
         self._earlier = new_accumulator(len(model.stators), model.n_place), 0.0
 
@@ -134,8 +134,11 @@ class Spin:
             middle = 0.5 * (low + high)
             slope = drive.slope(mean)
             setup = self._setup = self._pieces.setup(mean, acceleration, first, duration, middle, slope)
-            twist = setup.held.twist
-            ramp = TwistRamp(0.5 * (high - low) * twist, (high - low) / duration * twist)
+            ramp = TwistRamp(*(share * (high - low) * setup.held.twist for share in (0.5, 1.0 / duration)))
+            if setup.held.sagging_models and self._is_open(setup):
+                ramp = ramp.with_sag(
+                    sag_ramp(setup.held, acceleration, self.speed, end_speed, duration), setup
+                )
             if self._begun is None:
                 start = self._initial
                 if isinstance(start, Initial):
@@ -144,13 +147,18 @@ class Spin:
                 else:
                     self._begun = start
             reached = ramp.about_middle(self._begun, setup)
-            begun = self._passing.continued(
-                setup, reached, self._standing, Change(self.time - self._held_from, duration)
-            )
+            before = self._standing
+            goes_on = before is not None and before.setup.held is setup.held and setup.held.is_followed
+            begun = reached
+            if not goes_on:
+                begun = self._passing.continued(setup, reached, before, Change(duration))
+            self._passing.left = self._left
             carried = 0.0  # J
             if isinstance(begun, Place) and isinstance(reached, Place) and begun is not reached:
                 carried = energy_of(begun, setup) - energy_of(reached, setup)
-            passed = self._passing.take(setup, length, begun, self._earlier, is_balanced=True)
+            passed = self._passing.take(
+                setup, length, begun, self._earlier, is_balanced=True, goes_on=goes_on
+            )
             lift_samples(passed.whole, setup.model)
             ramp.lift(passed.whole, setup)
             if passed.reason:
@@ -163,11 +171,11 @@ class Spin:
             last_turn.note_rub(at, length, abs(flows[FRICTION_LOSS]))
             if may_be_halved and _is_uneven(rubbed, duration, length, per_revolution):
                 return None
-            before = self._momentum(state_at(reached, setup), first)
-            after = self._momentum(state_at(passed.end, setup), last)
-            turning = acceleration * 0.5 * duration * (before[1] + after[1])
+            at_first = self._momentum(state_at(reached, setup), first)
+            at_last = self._momentum(state_at(passed.end, setup), last)
+            turning = acceleration * 0.5 * duration * (at_first[1] + at_last[1])
             given = torque * turned + turning - flows[UNBALANCE_WORK] - flows[DRIVE_WORK] - carried
-            change = self._change(given, sum(before), sum(after))
+            change = self._change(given, sum(at_first), sum(at_last))
             if not math.isfinite(change):
                 return None
             error = abs(change / duration - acceleration) * duration**2 / 12.0
@@ -182,7 +190,7 @@ class Spin:
                 return None
         held = [
             inertia * 0.5 * speed**2 + speed * sum(carried_by)
-            for speed, carried_by in ((self.speed, before), (self.speed + change, after))
+            for speed, carried_by in ((self.speed, at_first), (self.speed + change, at_last))
         ]
         energies = np.array(
             [
@@ -198,8 +206,7 @@ class Spin:
         self.speed += change
         if not self.speed > 0.0:
             return None
-        if self._standing is None or self._standing.setup.held is not setup.held:
-            self._held_from = self.time
+        self._left = self._passing.left
         self._standing = self._passing.standing(setup, passed.end, length)
         self.time += duration
         last_turn.note_torque(at, length, torque - inertia * change / duration)
@@ -207,6 +214,10 @@ class Spin:
         self._begun = ramp.after(passed.end, setup)
         self._earlier = passed.accumulators[-1], duration
         return found
+
+    def _is_open(self, setup: PieceSetup) -> bool:
+        """Whether nothing touches as a piece begins, about the sag of its middle too."""
+        return self._begun is not None and self._passing.is_open(self._begun, setup)
 
     def _taken(
         self,

@@ -55,7 +55,7 @@ class Passing:
         self._case = clearance, friction
         self._check, self._say = check, say
         self._march: EventDrivenMarch | None = None
-        self._left: tuple[int, Floats] | None = None  # end of the last piece, in modal coordinates
+        self.left: tuple[int, Floats] | None = None  # end of the last piece, in modal coordinates
         self._lasted = 0.0  # s, duration of that piece
         self._room: dict[int, Samples] = {}  # by number of samples of a piece
         self._at: PieceSetup | None = None  # the piece at whose beginning the march is
@@ -99,13 +99,13 @@ class Passing:
     def continued(
         self, setup: PieceSetup, begun: State | Place, before: Standing | None, change: Change
     ) -> State | Place:
-        """Start of a piece after one with other matrices, or at another acceleration that these follow.
+        """Start of a piece after one of another range, or at another acceleration that modes follow.
 
         The height of a curved gap depends on the motion, which must not change while the gap is closed.
         """
         if self._march is None or before is None or not isinstance(begun, Place):
             return begun
-        if before.setup.held is setup.held and not setup.held.is_followed:
+        if not (before.setup.held.is_followed and setup.held.is_followed):
             return begun
         if not self._march.has_closed_form and (begun.contact_force > 0.0).any():
             return begun
@@ -143,7 +143,7 @@ class Passing:
         if self._check is not None:
             self._check()
         room = self._room_for(block.model, n_sample)
-        left = self._left if goes_on else None
+        left = self.left if goes_on else None
         march, setup = self._march, block[first]
         try:
             library = begin_stretch(march, setup, begun, self._longer(setup, n_sample), left)
@@ -158,7 +158,7 @@ class Passing:
 
         found = take_stretch(march, library, block, first, room, begun, earlier, look)
         if found is not None:
-            self._left, self._lasted = found.left, float(block.interval[first + found.n_piece - 1]) * n_sample
+            self.left, self._lasted = found.left, float(block.interval[first + found.n_piece - 1]) * n_sample
         return found
 
     def _longer(self, setup: PieceSetup, n_sample: int) -> float:
@@ -184,15 +184,15 @@ class Passing:
             self._march = made
             if goes_on:
                 mask, z = made.reached_in()
-                self._left = mask, np.zeros_like(z)
+                self.left = mask, np.zeros_like(z)
                 self._keep_fast(made, setup, n_sample)
         return made
 
     def _keep_fast(self, march: EventDrivenMarch, setup: PieceSetup, n_sample: int) -> None:
         """Let fast modes that follow the speed continue unchanged."""
         library = march.library
-        if self._left is not None and isinstance(library, RangeLibrary) and library.follows(march.mask):
-            march.keep_fast(self._left, setup.spin, self._longer(setup, n_sample))
+        if self.left is not None and isinstance(library, RangeLibrary) and library.follows(march.mask):
+            march.keep_fast(self.left, setup.spin, self._longer(setup, n_sample))
 
     def _pass(
         self,
@@ -217,7 +217,7 @@ class Passing:
             if reason is not None:
                 break
         gained = march.energy() - before if is_balanced else math.nan
-        self._left = march.reached_in() if isinstance(march, EventDrivenMarch) else None
+        self.left = march.reached_in() if isinstance(march, EventDrivenMarch) else None
         self._lasted = setup.interval * n_sample
         return Passed(samples.whole, accumulators, march.n_step, march.reached(), gained, reason or "")
 

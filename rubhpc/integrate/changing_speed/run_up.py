@@ -137,7 +137,7 @@ def integrate_run_up(
     lag = (accelerations * durations**2 / 12.0)[is_even]
     advice = pieces.ripples.advice(speeds[is_even], sizes[is_even] / per_revolution, lag, signal_names(model))
     unit, none = unit_rotation(model.rotor), np.zeros(model.rotor.n_dof)
-    piece, held_from = 0, times[0]  # time from which the matrices are held
+    piece = 0
     last: tuple[PieceSetup, int] | None = None  # piece of the matrices before, and its samples
     for block in pieces.blocks(speeds, accelerations, angles[:-1], durations, sizes):
         setup, size, begins_at = block[0], int(sizes[piece]), piece
@@ -165,13 +165,11 @@ def integrate_run_up(
             ended = passing.standing(last[0], reached, last[1])
             # Ringing by a jump of the acceleration is not caused by the matrices.
             jump = float(accelerations[piece] - accelerations[piece - 1])
-            change = Change(times[piece] - held_from, durations[piece], jump)
+            change = Change(durations[piece], jump)
             leant = jump * setup.held.lean
             reached = moved(reached, setup, leant, none)
             reached = passing.continued(setup, reached, ended, change)
             reached = moved(reached, setup, -leant, none)
-            if last[0].held is not setup.held:
-                held_from = times[piece]
         while not reason and (place := piece - begins_at) < len(block):
             first = int(cuts[piece])
             note(first / cuts[-1])

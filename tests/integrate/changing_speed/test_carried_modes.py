@@ -1,4 +1,4 @@
-"""What a change of the matrices does to a motion amid contacts of equal stators."""
+"""What a change of range does to a motion amid contacts of equal stators."""
 
 import math
 from dataclasses import replace
@@ -7,13 +7,14 @@ import numpy as np
 from trial_rig import trial_rig
 
 from rubhpc import run_up
+from rubhpc.integrate.changing_speed import speed_ranges
 from rubhpc.integrate.changing_speed.passing import Passing
 
 DRIVE = {"torque": 0.3, "inertia": 2e-3, "lowest": 20.0, "start": 250.0, "revolutions": 8}
 
 
 def whip_of(monkeypatch, count, **changed):
-    """A drive in a ring, and how much of its velocity each change of matrices takes, by pairs closed."""
+    """A drive in a ring, and how much of its velocity each change of range takes, by pairs closed."""
     rig = trial_rig(1, **changed)
     ring = tuple(replace(rig.stator[0], angle=0.3 + 2.0 * math.pi * i / count) for i in range(count))
     changes, go_on = [], Passing.continued
@@ -27,6 +28,7 @@ def whip_of(monkeypatch, count, **changed):
         return after
 
     monkeypatch.setattr(Passing, "continued", watched)
+    monkeypatch.setattr(speed_ranges, "WIDEST", 0.005)  # narrow ranges
     found = run_up(
         replace(rig, stator=ring),
         drive=DRIVE,

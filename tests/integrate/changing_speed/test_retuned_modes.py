@@ -1,4 +1,4 @@
-"""Tables tuned to a speed are those made again for it; matrices are held where that changes little."""
+"""Tables filled for a speed are those made again for it."""
 
 from dataclasses import replace
 
@@ -7,7 +7,6 @@ import pytest
 from trial_rig import trial_rig
 
 from rubhpc.case_arguments import case_of, read_probes
-from rubhpc.integrate.changing_speed.held_matrices import held_range
 from rubhpc.integrate.changing_speed.mode_parts import speeds_of
 from rubhpc.integrate.changing_speed.range_curved import RangeCurvedLibrary
 from rubhpc.integrate.changing_speed.range_laws import RangeFrictionLibrary, RangePenaltyLibrary
@@ -245,32 +244,3 @@ def test_tables_of_curved_gaps_are_those_at_that_speed(q):
             common = tuple(map(slice, np.minimum(values.shape, table.shape)))  # levels are those of the tick
             largest = np.abs(table).max(initial=0.0)
             assert np.abs(values[common] - table[common]).max(initial=0.0) <= 1e-9 * largest, name
-
-
-def test_matrices_are_held_while_the_response_errs_little():
-    """A tilting disc without coupling: its exponents move by half of Ip/It a unit of speed at standstill.
-
-    The error grows evenly from the middle of a range to its ends, where it is twice the mean.
-    """
-    stiffness, damping = np.eye(2) * 400.0**2, np.eye(2) * 2.0 * 0.02 * 400.0
-    gyroscopic = 0.1 * np.array([[0.0, 1.0], [-1.0, 0.0]])
-
-    def found(speed, acceleration):
-        drift = np.zeros((2, 2)), gyroscopic
-        return held_range(stiffness, damping + speed * gyroscopic, drift, speed, acceleration, accuracy=1e-3)[
-            0
-        ]
-
-    def response(speed, held):
-        matrix = stiffness - speed**2 * np.eye(2) + 1j * speed * (damping + held * gyroscopic)
-        return np.linalg.solve(matrix, [1.0, -1j])
-
-    for speed in (100.0, 250.0, 370.0, 415.0, 600.0):
-        half, errors = found(speed, 1e-3), []
-        for at in speed + half * np.linspace(-1.0, 1.0, 41):
-            exact = response(at, at)
-            errors.append(np.abs(response(at, speed) - exact).max() / np.abs(exact).max())
-        assert np.mean(errors) < 1.01e-3
-        assert max(errors) < 2.02e-3
-    assert found(415.0, 1e-3) < 0.2 * found(600.0, 1e-3)
-    assert found(415.0, 1e3) > found(415.0, 1e-3)  # a fast passage leaves no time to respond
