@@ -46,7 +46,6 @@ class Speeds(NamedTuple):
 
     spin: Floats  # (k,), rad/s
     within: Floats  # (k,), place in the range of the matrices, from -1 to 1
-    rise: Floats  # (k,), place of the acceleration, 0 for that of the matrices
     factor: Complexes  # (k,), by which the unbalance at unit speed acts: spin^2 exp(i angle) if steady, 1/s^2
     growth: Floats  # (k,), 1/s, of the unbalance force; the factor is that at the beginning
     tick: Floats  # (k,), s, resolution of events
@@ -62,7 +61,7 @@ def fill(tables: ModeTables, place: int, course: ModeCourse, speeds: Speeds, fir
     for j in range(first, last):
         turning = complex(speeds.growth[j], speeds.spin[j])
         if course.courses.kept.size > 0:
-            follow(tables, place + j, course.courses, speeds.within[j], speeds.rise[j])
+            follow(tables, place + j, course.courses, speeds.within[j])
             follow_rates(tables, place + j, course.exponent, course.is_pair.size)
         fill_at(tables, place + j, course, turning, speeds.factor[j], speeds.tick[j], speeds.interval[j])
 

@@ -68,7 +68,7 @@ class Block:
         held, speeds, template = self.held, self.speeds, self.held.template
         spin, tick = float(speeds.spin[place]), float(speeds.tick[place])
         search, growth = int(self.search_level[place]), float(speeds.growth[place])
-        at_place = held.at_place(float(speeds.within[place]), float(speeds.rise[place]))
+        at_place = held.at_place(float(speeds.within[place]))
         steady = template.clock
         return with_values(
             template,

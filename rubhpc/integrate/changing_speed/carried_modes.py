@@ -80,8 +80,8 @@ def carried(
     march.begin(setup, begun)
     library, mask = march.library, march.mask
     assert isinstance(library, RangeLibrary)
-    was = before.library.eigenmodes(mask, *before.setup.places)
-    now = library.eigenmodes(mask, *setup.places)
+    was = before.library.eigenmodes(mask, before.setup.within)
+    now = library.eigenmodes(mask, setup.within)
     if was is None or now is None:
         return begun
     old, factor = _turning(before.setup)

@@ -30,14 +30,14 @@ class Eigenmodes(NamedTuple):
     mirrored_drive: Complexes  # (m,)
 
     @classmethod
-    def of(cls, row: ModeTables, course: ModeCourse, within: float, rise: float) -> Eigenmodes:
-        """Eigenmodes of tables that follow the speed, at a place in the range and of the acceleration."""
+    def of(cls, row: ModeTables, course: ModeCourse, within: float) -> Eigenmodes:
+        """Eigenmodes of tables that follow the speed, at a place in the range."""
         courses, m = course.courses, course.is_pair.size
         for part in (courses.kept_shape, courses.kept_entry):
-            take_course(part, within, rise, courses.kept)
-        constant = taken(courses.enter_constant, row.enter_constant[0], within, rise)[:, :, :m]
+            take_course(part, within, courses.kept)
+        constant = taken(courses.enter_constant, row.enter_constant[0], within)[:, :, :m]
         motion, enter = (
-            taken(re, re_of[0], within, rise)[:, :m] + 1j * taken(im, im_of[0], within, rise)[:, :m]
+            taken(re, re_of[0], within)[:, :m] + 1j * taken(im, im_of[0], within)[:, :m]
             for re, im, re_of, im_of in (
                 (courses.motion_re, courses.motion_im, row.motion_re, row.motion_im),
                 (courses.enter_re, courses.enter_im, row.enter_re, row.enter_im),

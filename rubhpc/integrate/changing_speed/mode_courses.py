@@ -3,9 +3,7 @@
 Eigenvectors of the speeds at either side are brought to the length and phase that those in the middle see as
 theirs, so that exponents, shapes, their inverse and what is made of them go smoothly: parabolas follow them,
 with errors of the third order in the range. The inverse has to be their inverse, or each event would lose or
-gain motion: it is exact at seven places, and goes through these by polynomials of the sixth order. With the
-acceleration, which changes the matrices little, all of it goes evenly: from that in the middle to that of
-another acceleration there.
+gain motion: it is exact at seven places, and goes through these by polynomials of the sixth order.
 """
 
 from __future__ import annotations
@@ -44,7 +42,7 @@ _BY_COORDINATES = "exponent", "row", "resisting_re", "resisting_im"  # that have
 FAR = 0.5  # share of a mode in another of a speed beside it, over its own, from which it is not the same
 EQUAL = 1e-9  # relative difference of two exponents that repeat
 STILL, LEAST = 1e-13, 1e-16  # change of an entry over it, and over the greatest, below which it stays
-NONE = Course(np.zeros(0, dtype=np.int64), np.zeros((1, 0)), np.zeros(0))
+NONE = Course(np.zeros(0, dtype=np.int64), np.zeros((1, 0)))
 NOTHING = Courses(np.zeros(0), *[NONE] * (len(Courses._fields) - 1))
 
 
@@ -197,57 +195,55 @@ def constant_course(
     )
 
 
-def followed(course: ModeCourse, nodes: Sequence[Node], risen: Node | None, entered: Entries) -> ModeCourse:
-    """The same mode with what of it goes with the speed and its acceleration.
+def followed(course: ModeCourse, nodes: Sequence[Node], entered: Entries) -> ModeCourse:
+    """The same mode with what of it goes with the speed.
 
-    `nodes` are those at `NODES`, the middle first; `risen` is that in the middle at another acceleration, if
-    any; `entered` is what enters them (`entries`).
+    `nodes` are those at `NODES`, the middle first; `entered` is what enters them (`entries`).
     """
     middle, mode = nodes[0], nodes[0].mode
     m, n, width = mode.n_eigenmode, len(mode.motion) // 2, middle.exponent.size
-    of_all, n_node = [*nodes, *([risen] if risen else [])], len(nodes)
     courses = {}
     for name, n_kept in (("motion", 1), ("switch", 1), ("slip", 1), ("rate", m + 1)):
         for part in ("_re", "_im"):
-            values: Any = np.array([getattr(node.row, name + part)[0] for node in of_all])
-            courses[name + part] = _through(values, n_node, range(m + 1 - n_kept, m + 1))
+            values: Any = np.array([getattr(node.row, name + part)[0] for node in nodes])
+            courses[name + part] = _through(values, range(m + 1 - n_kept, m + 1))
     enter, take_off = entered.enter, entered.take_off
     padded: Complexes = np.zeros((len(enter), *middle.row.motion_re[0].shape), dtype=np.complex128)
     padded[:, :, :m] = enter.transpose(0, 2, 1)
     constant = np.zeros((len(enter), take_off.shape[1], 2, width))
     constant[..., 0, :m], constant[..., 1, :m] = take_off.real, take_off.imag
     of_entry = {"enter_re": padded.real, "enter_im": padded.imag, "enter_constant": constant}
-    courses |= {name: _through(values, len(EXACT)) for name, values in of_entry.items()}
-    loss = np.array([node.row.loss[0] for node in of_all])
+    courses |= {name: _through(values) for name, values in of_entry.items()}
+    loss = np.array([node.row.loss[0] for node in nodes])
     both = [m, width + m][: len(loss[0])]
     loss[1:, both] = loss[0][both]
-    courses["loss"] = _through(loss, n_node, both)
+    courses["loss"] = _through(loss, both)
     impulse = _response(mode.motion[n:, :m], course.drive, course.mirrored_drive, course.is_pair)
     shape: dict[str, Any] = {
-        "exponent": [node.exponent for node in of_all],
-        "output": [node.output for node in of_all],
-        "row": [node.seen for node in of_all],
+        "exponent": [node.exponent for node in nodes],
+        "output": [node.output for node in nodes],
+        "row": [node.seen for node in nodes],
     }
     if middle.resisting.size:
-        shape["resisting_re"] = [node.resisting.real for node in of_all]
-        shape["resisting_im"] = [node.resisting.imag for node in of_all]
-        shape["speed"] = [growth_of(node.mode).speed for node in of_all]
+        shape["resisting_re"] = [node.resisting.real for node in nodes]
+        shape["resisting_im"] = [node.resisting.imag for node in nodes]
+        shape["speed"] = [growth_of(node.mode).speed for node in nodes]
     entry = {"drive": enter[:, :, n:] @ impulse, "mirrored_drive": enter[:, :, n:].conj() @ impulse}
     kept, views, places = _room({name: values[0] for name, values in (shape | entry).items()})
 
-    def moved(arrays: dict[str, Any], count: int) -> Course:
+    def moved(arrays: dict[str, Any]) -> Course:
         found = []
         for name, values in arrays.items():
-            of_course = _through(values, count, [m] if name in _BY_COORDINATES else [])
+            of_course = _through(values, [m] if name in _BY_COORDINATES else [])
             found.append(of_course._replace(at=of_course.at + places[name]))
         return _joined(found)
 
-    shapes, entries = moved(shape, n_node), moved(entry, len(EXACT))
     of_losses = {name: views.pop(name) for name in Losses._fields if name in views}
+
     return course._replace(
         **views,
         losses=course.losses._replace(**of_losses),
-        courses=Courses(kept=kept, kept_shape=shapes, kept_entry=entries, **courses),
+        courses=Courses(kept=kept, kept_shape=moved(shape), kept_entry=moved(entry), **courses),
     )
 
 
@@ -261,10 +257,10 @@ def _response(
     return found
 
 
-def taken(course: Course, values: Floats, place: float, rise: float) -> Floats:
-    """A copy of an array with what goes with the speed at a place in the range, and of the acceleration."""
+def taken(course: Course, values: Floats, place: float) -> Floats:
+    """A copy of an array with what goes with the speed at a place in the range."""
     found = values.copy()
-    found.reshape(-1)[course.at] = np.polynomial.polynomial.polyval(place, course.value) + rise * course.rise
+    found.reshape(-1)[course.at] = np.polynomial.polynomial.polyval(place, course.value)
     return found
 
 
@@ -277,9 +273,9 @@ def _groups(exponent: Complexes) -> list[NDArray[np.int64]]:
 
 
 class Entries(NamedTuple):
-    """What enters a mode of m eigenmodes that follows the speed, at `EXACT`, and at another acceleration."""
+    """What enters a mode of m eigenmodes that follows the speed, at `EXACT`."""
 
-    enter: Complexes  # (7, m, 2 n), or (8, m, 2 n) with that at another acceleration
+    enter: Complexes  # (7, m, 2 n)
     take_off: Complexes  # (7, c, m), of constants
     lost: float  # share of a mode in another, at most, by which it is no inverse between these places
 
@@ -291,8 +287,8 @@ def shares_of(place: float, count: int) -> Floats:
     return shares
 
 
-def _through(values: Any, n_node: int, kept: Sequence[int] = ()) -> Course:
-    """What goes through the first `n_node` arrays, and to that at another acceleration if there is one more.
+def _through(values: Any, kept: Sequence[int] = ()) -> Course:
+    """What goes through arrays at `NODES` or `EXACT`.
 
     Coordinates `kept`, of the last axis, stay as in the first array.
     """
@@ -303,15 +299,14 @@ def _through(values: Any, n_node: int, kept: Sequence[int] = ()) -> Course:
     size = np.abs(flat[1:]).max(axis=0, initial=0.0)
     at = np.flatnonzero(size > np.maximum(STILL * np.abs(flat[0]), LEAST * size.max(initial=0.0)))
     moved = np.ascontiguousarray(flat[:, at])
-    factors = POWERS[n_node][:, 1:] @ moved[1:n_node]
+    factors = POWERS[len(values)][:, 1:] @ moved[1:]
     factors[0] += moved[0]
-    return Course(at, factors, moved[n_node] if len(moved) > n_node else np.zeros(at.size))
+    return Course(at, factors)
 
 
 def _joined(courses: list[Course]) -> Course:
     at = np.concatenate([course.at for course in courses])
-    value = np.concatenate([course.value for course in courses], axis=1)
-    return Course(at, value, np.concatenate([course.rise for course in courses]))
+    return Course(at, np.concatenate([course.value for course in courses], axis=1))
 
 
 def _room(arrays: dict[str, Any]) -> tuple[Floats, dict[str, Any], dict[str, int]]:

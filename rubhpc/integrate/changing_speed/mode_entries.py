@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     Complexes = NDArray[np.complex128]
 
 
-def entries(nodes: Sequence[Node], risen: Node | None) -> Entries:
+def entries(nodes: Sequence[Node]) -> Entries:
     """What enters a mode between `NODES`: inverses of its shapes, in the coordinates of those in the middle.
 
     A mode that stands for a pair has two coordinates here, real and imaginary part, so that all is real but
@@ -37,13 +37,8 @@ def entries(nodes: Sequence[Node], risen: Node | None) -> Entries:
     mode, n_node = nodes[0].mode, len(nodes)
     m, is_pair = mode.n_eigenmode, weights(mode) > 1.5
     paired = np.flatnonzero(is_pair)
-    of_all = [*nodes[1:], *([risen] if risen else [])]
-    change = np.array([node.mode.motion for node in of_all]) - mode.motion
-    places = [shares_of(place, n_node) for place in EXACT]
-    shares = np.zeros((len(places) + bool(risen), len(change)))
-    shares[: len(places), : n_node - 1] = places
-    if risen:
-        shares[-1, -1] = 1.0
+    change = np.array([node.mode.motion for node in nodes[1:]]) - mode.motion
+    shares = np.array([shares_of(place, n_node) for place in EXACT])
     is_moved = (change[..., :m] != 0.0).any(axis=(0, 1))
     columns = np.flatnonzero(np.append(is_moved, is_moved[paired]))
     every = _in_parts(mode.enter[:m].T, is_pair, 1.0).T
@@ -61,9 +56,8 @@ def entries(nodes: Sequence[Node], risen: Node | None) -> Entries:
         return np.tensordot(shares, mixed, axes=1) + unit
 
     back = np.linalg.inv(turned(shares[1:]))
-    through = [unit, *back[: len(EXACT) - 1]]
-    judged = np.zeros((len(JUDGED), len(change)))
-    judged[:, : n_node - 1] = [shares_of(place, n_node) for place in JUDGED]
+    through = [unit, *back]
+    judged = np.array([shares_of(place, n_node) for place in JUDGED])
     lost = max(
         most_of(between(through, place) @ kept - unit)
         for place, kept in zip(JUDGED, turned(judged), strict=True)

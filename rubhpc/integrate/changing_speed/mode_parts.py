@@ -72,12 +72,11 @@ def speeds_of(
     held_spin: float,
     sample_level: int,
     reach: float = math.inf,
-    rise: float = 0.0,
 ) -> Speeds:
     """Speeds (rad/s) to which tables are filled whose matrices are those at `held_spin`, or within `reach`.
 
     `factor` (1/s^2) is what the unbalance at unit speed acts by, which grows by `growth` (1/s), `tick` (s)
-    the resolution of events, `rise` the place of their acceleration (`mode_courses`).
+    the resolution of events.
     """
     spins, ticks = np.asarray(spin, dtype=np.float64), np.asarray(tick, dtype=np.float64)
     factors = np.asarray(factor, dtype=np.complex128)
@@ -85,7 +84,6 @@ def speeds_of(
     return Speeds(
         spin=spins,
         within=(spins - held_spin) / reach,
-        rise=np.full(spins.size, rise),
         factor=factors,
         growth=grown,
         tick=ticks,

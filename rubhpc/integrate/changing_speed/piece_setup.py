@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.changing_speed.acceleration_range import Judge
     from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
     from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs
     from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
@@ -46,7 +45,7 @@ class HeldMatrices:
 
     `momentum` (n, n) is the change of the stiffness with the acceleration, per rad/s^2. `beside` are the
     model and its matrices at other speeds of the range (`mode_courses.NODES`), through which they follow
-    the speed; none where they are constant. `judge` decides which accelerations they follow.
+    the speed; none where they are constant.
     """
 
     template: PieceSetup  # set-up to copy for the speed of a piece
@@ -65,9 +64,7 @@ class HeldMatrices:
         sample_level: int,
         buffers: dict[tuple[object, ...], TableBuffer],
         beside: Sequence[tuple[Model, ReducedModel]] = (),
-        judge: Judge | None = None,
     ) -> None:
-        self._judge = judge
         self._buffers, self._beside = buffers, beside
         self.model, self.reduced = model, reduced
         self.at_hand = reduced  # at the speed of the current piece
@@ -99,25 +96,7 @@ class HeldMatrices:
         far, changed = self._reach
         if abs(speed - self.reduced.spin) > far or slope != self._slope:
             return False
-        if self.risen is not None:
-            assert self._judge is not None
-            return acceleration == self.acceleration or self._judge.serves(acceleration)
         return abs(acceleration - self.acceleration) <= changed
-
-    @cached_property
-    def risen(self) -> ReducedModel | None:
-        """The matrices in the middle of the range at another acceleration, which they follow too."""
-        change = self._judge.rise if self._judge and self._beside else 0.0
-        if not change:
-            return None
-        return with_values(self.reduced, stiffness=self.reduced.stiffness + change * self.momentum)
-
-    def rise(self, acceleration: float) -> float:
-        """Place of an acceleration, rad/s^2: 0 for that of the matrices, 1 for that of `risen`."""
-        if self.risen is None:
-            return 0.0
-        assert self._judge is not None
-        return (acceleration - self.acceleration) / self._judge.rise
 
     @property
     def reach(self) -> float:
@@ -133,13 +112,11 @@ class HeldMatrices:
         """Place of a speed (rad/s) in the range, from -1 to 1."""
         return (speed - self.reduced.spin) / self.reach
 
-    def at_place(self, within: float, rise: float) -> ReducedModel:
-        """The model at a place in the range and of the acceleration; its unbalance is that of the middle."""
+    def at_place(self, within: float) -> ReducedModel:
+        """The model at a place in the range; its unbalance is that of the middle."""
         if not self._beside:
             return self.reduced
         values = {name: between(nodes, within) for name, nodes in self._at_nodes.items()}
-        if self.risen is not None and rise:
-            values["stiffness"] += rise * (self.risen.stiffness - self.reduced.stiffness)
         return with_values(self.reduced, **values)
 
     @cached_property
@@ -189,7 +166,6 @@ class HeldMatrices:
                 buffers=self._buffers,
                 beside=[reduced for _, reduced in self._beside],
                 at_place=self.at_place,
-                risen=self.risen,
                 is_balanced=self.is_balanced,
                 at_once=self.at_once,
                 **make(),
@@ -226,9 +202,9 @@ class PieceSetup(ModalSetup):
         return self.held.sample_level
 
     @property
-    def places(self) -> tuple[float, float]:
-        """Place of the speed in the range of the matrices, from -1 to 1, and that of the acceleration."""
-        return float(self.speeds.within[self.place]), float(self.speeds.rise[self.place])
+    def within(self) -> float:
+        """Place of the speed in the range of the matrices, from -1 to 1."""
+        return float(self.speeds.within[self.place])
 
     def goes_on_in(self, other: PieceSetup, acceleration: float, next_acceleration: float) -> bool:
         """Whether the next piece has matrices of the same range that follow the speed."""

@@ -42,9 +42,9 @@ class RangeFrictionLibrary(StatesOfPairs, RangeLibrary):
         self._pairs = pairs
         super().__init__(*args, **keys)
 
-    def eigenmodes(self, mask: int, within: float, rise: float) -> Eigenmodes | None:
+    def eigenmodes(self, mask: int, within: float) -> Eigenmodes | None:
         """As of `RangeLibrary`; None where a pair is closed, since a rim's speed changes what enters."""
-        return None if self._closed_pairs(mask) else super().eigenmodes(mask, within, rise)
+        return None if self._closed_pairs(mask) else super().eigenmodes(mask, within)
 
     def _others(self, beside: Sequence[ReducedModel]) -> list[tuple[ReducedModel, float]]:
         return super()._others(beside or [self.reduced] * (len(NODES) - 1))

@@ -84,10 +84,8 @@ class RangeLibrary(ModeLibrary):
         The same at other speeds of the range (`mode_courses.NODES`), through which modes follow the speed;
         none where matrices stay what they are.
     at_place : callable, optional
-        The same at a place in the range, from -1 to 1, and of the acceleration: for modes that cannot be
+        The same at a place in the range, from -1 to 1: for modes that cannot be
         followed, which are solved at each piece.
-    risen : ReducedModel, optional
-        The same in the middle of the range at another acceleration, with which modes go evenly.
     is_balanced : bool
         Whether energies are asked for.
     buffers : dict, optional
@@ -111,8 +109,7 @@ class RangeLibrary(ModeLibrary):
         n_level: int,
         reach: float = 0.0,
         beside: Sequence[ReducedModel] = (),
-        at_place: Callable[[float, float], ReducedModel] | None = None,
-        risen: ReducedModel | None = None,
+        at_place: Callable[[float], ReducedModel] | None = None,
         is_balanced: bool = True,
         buffers: dict[tuple[object, ...], TableBuffer] | None = None,
         at_once: int = AT_ONCE,
@@ -131,7 +128,6 @@ class RangeLibrary(ModeLibrary):
         self.width = self._width_of(model, friction)
         self._is_followed = bool(beside)
         self._beside = [self._with(*other) for other in self._others(beside)]
-        self._risen = [self._with(risen)] if risen is not None else []
         self._exponents = {}
         self._held: dict[int, tuple[ModeTables, ModeCourse]] = {}  # by the set of closed pairs
         self._strange: set[int] = set()  # modes that cannot be followed
@@ -230,15 +226,15 @@ class RangeLibrary(ModeLibrary):
         if self._filled.get(mask, 0) <= at:
             end = min(speeds.spin.size, self.window_end)
             if mask in self._strange:
-                self._solve_at(mask, place, float(speeds.within[at]), float(speeds.rise[at]))
+                self._solve_at(mask, place, float(speeds.within[at]))
                 end = at + 1
             fill(self.tables(), place - at, self._held[mask][1], speeds, at, end)
             self._filled[mask] = end
         self.masks[place] = self.tables().mask[place] = mask
         return True
 
-    def eigenmodes(self, mask: int, within: float, rise: float) -> Eigenmodes | None:
-        """Those of a set of closed pairs at a place in the range, from -1 to 1, and of the acceleration.
+    def eigenmodes(self, mask: int, within: float) -> Eigenmodes | None:
+        """Those of a set of closed pairs at a place in the range, from -1 to 1.
 
         None where a speed changes what enters them otherwise, or it has no room.
         """
@@ -246,7 +242,7 @@ class RangeLibrary(ModeLibrary):
             self.forget()
         if not self._has(mask) or mask in self._strange:
             return None
-        return Eigenmodes.of(*self._held[mask], within, rise)
+        return Eigenmodes.of(*self._held[mask], within)
 
     def filled(self, met: set[int]) -> Ints:
         """Sets of closed pairs of the tables that are filled for this piece or later ones, of those met."""
@@ -305,23 +301,18 @@ class RangeLibrary(ModeLibrary):
         middle = self._node(mode)
         course = self._constant(middle)
         if self._beside:
-            others = (*self._beside, *self._risen)
-            found = [matched(mode, library._solved(mode.mask)) for library in others]
-            nodes = [middle, *(lib._node(one) for lib, one in zip(others, found, strict=True) if one)]
-            if len(nodes) > len(found):
-                n = 1 + len(self._beside)
-                risen = nodes[n] if self._risen else None
-                entered = entries(nodes[:n], risen)
-                if entered.lost <= MOST_LOST:
-                    course = followed(course, nodes[:n], risen, entered)
+            found = [matched(mode, library._solved(mode.mask)) for library in self._beside]
+            nodes = [middle, *(lib._node(one) for lib, one in zip(self._beside, found, strict=True) if one)]
+            if len(nodes) > len(found) and (entered := entries(nodes)).lost <= MOST_LOST:
+                course = followed(course, nodes, entered)
             if not course.courses.kept.size:
                 self._strange.add(mode.mask)
         self._held[mode.mask] = without_filled(middle.row, len(self._output)), course
 
-    def _solve_at(self, mask: int, place: int, within: float, rise: float) -> None:
+    def _solve_at(self, mask: int, place: int, within: float) -> None:
         """Solve a mode that cannot be followed at a place in the range, and put it into the buffer."""
         assert self._at_place is not None
-        library = self._with(self._at_place(within, rise), within)
+        library = self._with(self._at_place(within), within)
         node = library._node(library._solved(mask))
         row, _ = self._held[mask] = without_filled(node.row, len(self._output)), library._constant(node)
         for field, new in zip(self.tables(), row, strict=True):

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.changing_speed.followed_range import Reach
     from rubhpc.integrate.changing_speed.range_library import TableBuffer
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
@@ -47,7 +46,6 @@ class SpeedRanges:
     def __init__(self, fastest: ModalSetup) -> None:
         self._fastest = fastest
         self._basis = fastest.reduced.basis
-        self.accelerations: tuple[float, float] | None = None  # rad/s^2, least and greatest to come
         model = fastest.model
         rotor = model.rotor
         self._inertia = rotor.mass @ unit_rotation(rotor)
@@ -70,7 +68,7 @@ class SpeedRanges:
         the range tried first.
         """
         fastest, free = self._fastest, self._fastest.free_spin
-        reach, swing, judge = self._reach(speed, acceleration, slope, guess)
+        reach, swing = self._reach(speed, acceleration, slope, guess)
         if free is None:
             speed += np.sign(acceleration) * reach
         about = acceleration, slope, speed
@@ -86,7 +84,7 @@ class SpeedRanges:
         buffers = _BUFFERS.setdefault(fastest, {})
         at = acceleration, slope, ranges
         held = HeldMatrices(
-            model, reduced, self.phasor, self._momentum, *at, slowest.sample_level, buffers, beside, judge
+            model, reduced, self.phasor, self._momentum, *at, slowest.sample_level, buffers, beside
         )
         held.is_balanced = free is not None
         if free is not None:
@@ -156,8 +154,10 @@ class SpeedRanges:
             reduced.__dict__[name] = getattr(fastest.reduced, name)
         return model, reduced
 
-    def _reach(self, speed: float, acceleration: float, slope: float, guess: float | None) -> Reach:
-        """The range in which modes follow the speed."""
+    def _reach(
+        self, speed: float, acceleration: float, slope: float, guess: float | None
+    ) -> tuple[float, float]:
+        """Half of the range in which modes follow the speed, rad/s, and of accelerations, rad/s^2."""
         fastest = self._fastest
         is_free = fastest.free_spin is not None
 
@@ -175,7 +175,6 @@ class SpeedRanges:
             self._widest(speed, acceleration),
             sense=0.0 if is_free else float(np.sign(acceleration)),
             accuracy=(DRIVEN_SHARE if is_free else 1.0) * fastest.accuracy,
-            others=self.accelerations or (acceleration, acceleration),
             guess=guess,
         )
 
