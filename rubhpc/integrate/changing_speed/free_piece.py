@@ -8,12 +8,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rubhpc.integrate.changing_speed.carried_modes import Change
 from rubhpc.integrate.changing_speed.last_turn import LastTurn
-from rubhpc.integrate.changing_speed.passing import Passed, Passing, energy_of, state_at
+from rubhpc.integrate.changing_speed.passing import Passed, Passing, state_at
 from rubhpc.integrate.changing_speed.pieces import Pieces
 from rubhpc.integrate.changing_speed.twist_ramp import TwistRamp, sag_ramp
-from rubhpc.integrate.marches.modal import Place
 from rubhpc.integrate.measuring.samples import lift_samples, new_accumulator
 from rubhpc.integrate.start import start_of
 from rubhpc.kernels.accumulators import (
@@ -31,8 +29,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.changing_speed.carried_modes import Standing
+    from rubhpc.integrate.changing_speed.carried_modes import Ended
     from rubhpc.integrate.changing_speed.piece_setup import PieceSetup
+    from rubhpc.integrate.marches.modal import Place
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.record import State
     from rubhpc.study.drive_law import DriveLaw
@@ -88,8 +87,7 @@ class Spin:
         self._twisting = drive.at(drive.start)
         self._begun: State | Place | None = None
         self._setup: PieceSetup | None = None  # of the last piece
-        self._standing: Standing | None = None  # where it has ended
-        self._left = self._passing.left  # where it has ended, in modal coordinates
+        self._ended: Ended | None = None  # where it has ended
         # The contact forces of the piece before, and how long it took, s.
         self._earlier = new_accumulator(len(model.stators), model.n_place), 0.0
 
@@ -147,17 +145,12 @@ class Spin:
                 else:
                     self._begun = start
             reached = ramp.about_middle(self._begun, setup)
-            before = self._standing
+            before = self._ended
+            self._passing.left = before.left if before else None
             goes_on = before is not None and before.setup.held is setup.held and setup.held.is_followed
-            begun = reached
-            if not goes_on:
-                begun = self._passing.continued(setup, reached, before, Change(duration))
-            self._passing.left = self._left
-            carried = 0.0  # J
-            if isinstance(begun, Place) and isinstance(reached, Place) and begun is not reached:
-                carried = energy_of(begun, setup) - energy_of(reached, setup)
+            goes_on = goes_on or self._passing.goes_over(setup, reached, before)
             passed = self._passing.take(
-                setup, length, begun, self._earlier, is_balanced=True, goes_on=goes_on
+                setup, length, reached, self._earlier, is_balanced=True, goes_on=goes_on
             )
             lift_samples(passed.whole, setup.model)
             ramp.lift(passed.whole, setup)
@@ -174,7 +167,7 @@ class Spin:
             at_first = self._momentum(state_at(reached, setup), first)
             at_last = self._momentum(state_at(passed.end, setup), last)
             turning = acceleration * 0.5 * duration * (at_first[1] + at_last[1])
-            given = torque * turned + turning - flows[UNBALANCE_WORK] - flows[DRIVE_WORK] - carried
+            given = torque * turned + turning - flows[UNBALANCE_WORK] - flows[DRIVE_WORK]
             change = self._change(given, sum(at_first), sum(at_last))
             if not math.isfinite(change):
                 return None
@@ -195,7 +188,7 @@ class Spin:
         energies = np.array(
             [
                 held[1] - held[0],
-                passed.gained + carried,
+                passed.gained,
                 torque * turned + turning,
                 flows[FRICTION_LOSS],
                 flows[DAMPING_LOSS],
@@ -206,8 +199,7 @@ class Spin:
         self.speed += change
         if not self.speed > 0.0:
             return None
-        self._left = self._passing.left
-        self._standing = self._passing.standing(setup, passed.end, length)
+        self._ended = self._passing.ended(setup, length, acceleration)
         self.time += duration
         last_turn.note_torque(at, length, torque - inertia * change / duration)
         self._twisting = high

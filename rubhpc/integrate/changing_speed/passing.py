@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.integrate.case import march_of
-from rubhpc.integrate.changing_speed.carried_modes import Change, Standing, carried, standing
+from rubhpc.integrate.changing_speed.carried_modes import Ended, carried
 from rubhpc.integrate.changing_speed.piece_setup import with_values
 from rubhpc.integrate.changing_speed.range_library import RangeLibrary
 from rubhpc.integrate.changing_speed.stretch import Stretch, begin_stretch, take_stretch
@@ -96,20 +96,37 @@ class Passing:
             self._check()
             self._say(f"a case at {setup.spin * 30.0 / math.pi:.0f} rpm")
 
-    def continued(
-        self, setup: PieceSetup, begun: State | Place, before: Standing | None, change: Change
-    ) -> State | Place:
-        """Start of a piece after one of another range, or at another acceleration that modes follow.
+    def goes_over(
+        self, setup: PieceSetup, begun: State | Place, before: Ended | None, jump: float = 0.0
+    ) -> bool:
+        """Whether fast modes go on from a piece before, of another range or acceleration, into the next one.
 
-        The height of a curved gap depends on the motion, which must not change while the gap is closed.
+        `jump` (rad/s^2) is a sudden change of the acceleration. The height of a curved gap depends on the
+        motion, which must not change while the gap is closed.
         """
-        if self._march is None or before is None or not isinstance(begun, Place):
-            return begun
+        march = self._march
+        if march is None or before is None or not isinstance(begun, Place):
+            return False
+        if not march.has_closed_form and (begun.contact_force > 0.0).any():
+            return False
         if not (before.setup.held.is_followed and setup.held.is_followed):
-            return begun
-        if not self._march.has_closed_form and (begun.contact_force > 0.0).any():
-            return begun
-        return carried(before, change, self._march, setup, begun)
+            return False
+        try:
+            march.begin(setup, begun)
+        except NoClosedForm:
+            return False
+        z = carried(before, jump, march, setup)
+        if z is not None:
+            self.left = before.left[0], z
+        return z is not None
+
+    def ended(self, setup: PieceSetup, n_sample: int, acceleration: float) -> Ended | None:
+        """End of the last piece in its own modes, if it has any; its acceleration is in rad/s^2."""
+        library = None if self._march is None else self._march.library
+        if self.left is None or not isinstance(library, RangeLibrary):
+            return None
+        mask, z = self.left
+        return Ended(setup, library, (mask, z.copy()), setup.interval * n_sample, acceleration)
 
     def is_open(self, begun: State | Place, setup: PieceSetup) -> bool:
         """Whether nothing touches as a piece begins, about the sag of its middle too."""
@@ -120,12 +137,6 @@ class Passing:
         if self._march is None:
             return False
         return bool((self._march.gaps(setup, begun) >= 0.0).all())
-
-    def standing(self, setup: PieceSetup, end: State | Place, n_sample: int) -> Standing | None:
-        """End of the last piece in its own modes, if it has any."""
-        if self._march is None or not isinstance(end, Place):
-            return None
-        return standing(self._march, setup, end, setup.interval * n_sample)
 
     def take_several(
         self,
@@ -246,10 +257,3 @@ def state_at(begun: State | Place, setup: PieceSetup) -> State:
     displacement, velocity = (setup.reduced.basis @ begun.motion.reshape(2, -1).T).T.copy()
     displacement[: begun.sag.size] += begun.sag
     return State.of_bodies(setup.model, displacement, velocity, begun.contact_force)
-
-
-def energy_of(begun: Place, setup: PieceSetup) -> float:
-    """Mechanical energy, J, of the motion at the beginning of a piece, about its sag."""
-    (displacement, velocity), moved = begun.motion.reshape(2, -1), begun.sag - setup.model.sag
-    displacement = displacement + setup.reduced.project[:, : moved.size] @ moved
-    return float(0.5 * (velocity @ velocity + displacement @ setup.reduced.stiffness @ displacement))

@@ -69,6 +69,7 @@ class HeldMatrices:
         self.model, self.reduced = model, reduced
         self.at_hand = reduced  # at the speed of the current piece
         self.twist = self.lean = np.zeros(model.sag.size)  # sag under 1 N m of a drive; under 1 rad/s^2
+        self.slope = np.zeros(model.sag.size)  # change of the sag with the speed
         self.sagging_models: list[Model] = []  # at `mode_courses.NODES`, where the sag depends on the speed
         self.kept = KeptParts()
         self.bodies: dict[float, Reduced] = {}  # of each friction, without what a piece changes

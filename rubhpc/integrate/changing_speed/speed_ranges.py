@@ -116,8 +116,8 @@ class SpeedRanges:
         force = -self._inertia - tilted if free is None else -0.5 * tilted
         if held.sagging_models:  # dampers act against the rate of the sag
             rotor, (_, below, above) = model.rotor, held.sagging_models
-            rate = (above.sag - below.sag) / ((NODES[2] - NODES[1]) * reach)
-            force = force - (rotor.damping + speed * rotor.gyroscopic) @ rate
+            held.slope = (above.sag - below.sag) / ((NODES[2] - NODES[1]) * reach)
+            force = force - (rotor.damping + speed * rotor.gyroscopic) @ held.slope
         held.lean = sag_under(model.rotor, force)
         return held
 
