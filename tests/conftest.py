@@ -75,7 +75,7 @@ SLOW = (
     "integrate/test_periodic.py::test_motion_beside_it_draws_near_by_the_largest_multiplier",
     "integrate/test_probe_records.py::test_schemes_agree",
     "integrate/measuring/test_regimes_lyapunov.py",
-    "integrate/changing_speed/test_retuned_modes.py",
+    "integrate/changing_speed/test_filled_modes.py",
     "integrate/changing_speed/test_run_up.py",
     "integrate/changing_speed/test_run_up_machines.py",
     "integrate/changing_speed/test_steep_run_ups.py",

@@ -17,7 +17,6 @@ Complexes = NDArray[np.complex128]
 Ints = NDArray[np.int64]
 
 STEADY = 1e-13  # sum of two exponents over the greatest, below which it is zero but for rounding
-NO_RIM = -1  # instead of a coordinate
 
 
 class Losses(NamedTuple):
@@ -29,7 +28,7 @@ class Losses(NamedTuple):
     half: float  # N/m, of the stiffness of springs
     gap: Floats  # (k, n), gaps of those pressed by reduced displacements
     clearance: Ints  # (k,), coordinates of their clearances
-    one: int  # coordinate that is 1 where the rim's speed matters, or NO_RIM
+    one: int  # coordinate that is 1, or -1 without set-valued friction
     growing: Ints  # (g,), coordinates that grow
     speed: Floats  # (g,), m/s
 

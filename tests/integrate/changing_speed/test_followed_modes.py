@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_retuned_modes import LAWS, setup
+from test_filled_modes import LAWS, setup
 
 from rubhpc.integrate.changing_speed.mode_courses import NODES
 from rubhpc.integrate.changing_speed.mode_parts import speeds_of

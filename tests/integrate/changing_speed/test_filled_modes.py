@@ -16,7 +16,7 @@ from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
 from rubhpc.integrate.reduced_model.energy_forms import energies_of
 from rubhpc.integrate.reduced_model.friction_mode import mask_of, solve_friction_mode
 from rubhpc.integrate.reduced_model.mode_tables import tabulate
-from rubhpc.integrate.reduced_model.penalty_mode import Penalty
+from rubhpc.integrate.reduced_model.penalty_mode import Penalty, stored_energy
 from rubhpc.integrate.reduced_model.reduction import directions
 from rubhpc.integrate.reduced_model.touching import (
     contact_mode_among,
@@ -105,7 +105,7 @@ class Springs:
         mode = penalty_mode_among(among, reduced, penalty, opened, mask, None)
         damped, friction = penalty.damped(reduced, mask), library._friction_of(mode)
         tables = measured(mode, damped, library.slip, friction, **levels)
-        tables.loss[0] += penalty.stored_energy(mode, library.width)
+        tables.loss[0] += stored_energy(1e6, penalty.gap_jacobian, penalty.pressed(mask), mode, library.width)
         return tables
 
 
@@ -124,7 +124,7 @@ class StickingSprings(Sticking):
         mode = friction_mode_among(among, reduced, pairs, mask, None)
         damped, friction = pairs.damped(reduced, mask), mode.friction_forces(pairs)
         tables = measured(mode, damped, library.slip[:0], friction, **levels)
-        tables.loss[0] += pairs.stored_energy(mode, library.width)
+        tables.loss[0] += stored_energy(1e6, pairs.gap_jacobian, pairs.closed(mask), mode, library.width)
         return tables
 
 
