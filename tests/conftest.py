@@ -75,7 +75,7 @@ SLOW = (
     "integrate/branches/test_branch.py::test_several_pairs_that_slide_under_coulombs_law_branch_as_pairs_that_slide",
     "integrate/test_periodic.py::test_motion_beside_it_draws_near_by_the_largest_multiplier",
     "integrate/measuring/test_regimes_lyapunov.py",
-    "integrate/changing_speed/test_retuned_modes.py",
+    "integrate/changing_speed/test_filled_modes.py",
     "integrate/changing_speed/test_run_up.py",
     "integrate/changing_speed/test_run_up_machines.py",
     "integrate/changing_speed/test_steep_run_ups.py",

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.model import Model
     from rubhpc.integrate.changing_speed.piece_setup import HeldMatrices, PieceSetup
-    from rubhpc.kernels.retuning import Speeds
+    from rubhpc.kernels.filling import Speeds
 
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]
@@ -68,7 +68,7 @@ class Block:
         held, speeds, template = self.held, self.speeds, self.held.template
         spin, tick = float(speeds.spin[place]), float(speeds.tick[place])
         search, growth = int(self.search_level[place]), float(speeds.growth[place])
-        at_place = held.at_place(float(speeds.within[place]), float(speeds.rise[place]))
+        at_place = held.at_place(float(speeds.within[place]))
         steady = template.clock
         return with_values(
             template,

@@ -1,11 +1,9 @@
-"""Higher modes across a change of the held matrices, without artificial ringing.
+"""Fast modes from one range of speeds to the next, or to another acceleration.
 
-The quasi-static response of a fast mode changes gradually with the speed, but held matrices change at once.
-In the modes `l` of the next matrices, a motion `exp(m t)` that continued unchanged would excite each mode. A
-linear change from the time `-a` before to `b` after excites it by the mean of `exp((m - l) s)` over these
-times, which is 1 for slow motions and vanishes for fast ones. Powers of its modulus represent a change that
-begins and ends smoothly; a motion that decays within these times has no effect. After a contact, ringing
-higher modes continue unchanged. Ringing by a sudden change of the acceleration is real, and kept.
+The speed changes evenly, so that fast modes do not ring for it: within a range they go on with their
+coordinates (`kernels.pieces.begin_piece`). In the modes of another range these are the coordinates
+of the same free motion. A sudden change of the acceleration makes them ring by what it changes
+at this speed: matrices, unbalance force and sag.
 """
 
 from __future__ import annotations
@@ -15,164 +13,75 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary
-from rubhpc.integrate.marches.modal import Place
-from rubhpc.kernels.pieces import FAST, QUICK
+from rubhpc.integrate.changing_speed.range_library import RangeLibrary
+from rubhpc.kernels.pieces import FAST
 
 if TYPE_CHECKING:
+    from rubhpc.integrate.changing_speed.eigenmodes import Eigenmodes
     from rubhpc.integrate.changing_speed.piece_setup import PieceSetup
     from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
-LOWEST = 3.0  # frequency of a mode over the spin; lower modes take part in contact
-# The same of what has not touched and rings long: its damping over its frequency.
-LOWEST_RINGING, RINGING = 1.5, 0.1
-TOUCH = 0.25  # revolutions, at most, before and after a change in motions with contact
-SLOW = 1e-6  # exponent times time, below which a change is immediate
+
+NEARLY_FAST = 0.8 * FAST  # frequency of a mode over the spin, above which its motion is taken over
 
 
-class Standing(NamedTuple):
-    """End of a piece, in its own matrices."""
+class Ended(NamedTuple):
+    """End of a piece."""
 
     setup: PieceSetup
-    library: RetunedLibrary
-    end: Place
-    constants: Floats  # values of the coordinates that do not move
+    library: RangeLibrary
+    left: tuple[int, Floats]  # as of `EventDrivenMarch.reached_in`
     time: float  # s, since the piece began
+    acceleration: float  # rad/s^2
 
 
-class Change(NamedTuple):
-    """How the speed changes where matrices do."""
-
-    held_for: float  # s, since when the matrices before were held
-    ahead: float  # s, duration of the next piece
-    jump: float = 0.0  # rad/s^2, sudden change of the acceleration
-
-
-class Parts(NamedTuple):
-    """A motion as a sum of exponentials, each the real part of its shape."""
-
-    exponent: Complexes  # (p,), 1/s
-    shape: Complexes  # (2 n, p)
-
-
-def standing(march: EventDrivenMarch, setup: PieceSetup, end: Place, time: float) -> Standing | None:
-    """End of a piece by a march; None where modes are not carried over."""
-    library = march.library
-    if not isinstance(library, RetunedLibrary):
-        return None
-    return Standing(setup, library, end, march.constants, time)
-
-
-def carried(
-    before: Standing, change: Change, march: EventDrivenMarch, setup: PieceSetup, begun: Place
-) -> Place:
-    """The start of a piece, without the ringing that its new matrices would cause.
+def carried(before: Ended, jump: float, march: EventDrivenMarch, setup: PieceSetup) -> Floats | None:
+    """Coordinates (2, m) of the end of a piece in the modes of the next one; None where they have none.
 
     Parameters
     ----------
-    before : Standing
-        At the same instant.
+    jump : float, rad/s^2
+        Sudden change of the acceleration.
     march : EventDrivenMarch
-        It has no valid state afterwards, until it begins again.
-    begun : Place
-        The start without this correction.
+        At the beginning of the next piece.
     """
-    march.begin(setup, begun)
-    library, mask = march.library, march.mask
-    assert isinstance(library, RetunedLibrary)
-    was = before.library.eigenmodes(mask, *before.setup.places)
-    now = library.eigenmodes(mask, *setup.places)
-    if was is None or now is None:
-        return begun
-    old, factor = _turning(before.setup)
-    z = was.entered(before.end.motion, before.constants, old, factor, before.time)
-    factor = factor * np.exp(old * before.time)
-    forced = was.response(old, factor)
-    still = march.begun_motion - (was.motion @ z).real - forced.real
-    parts = Parts(
-        np.concatenate([was.exponent, [0.0, old]]),
-        np.column_stack([was.motion * z, still, forced]),
-    )
-    has_touched = any(march.met)
-    size, spin = np.abs(now.exponent.imag), abs(setup.spin)
-    is_followed = before.setup.held.is_followed and setup.held.is_followed
-    fast = size > LOWEST * spin
-    if is_followed and not change.jump:  # as from piece to piece
-        fast = np.abs(now.exponent) > max(FAST * spin, QUICK / max(before.time, change.ahead))
-    elif not is_followed and not has_touched:
-        fast |= (size > LOWEST_RINGING * spin) & (np.abs(now.exponent.real) < RINGING * size)
-    exponent, enter = now.exponent[fast], now.enter[fast]
-    left = 0.5 * np.stack([enter @ parts.shape, enter @ parts.shape.conj()])  # (2, modes, parts)
-    direct, mirrored = now.forced(old, factor)
-    left[0, :, -1] -= direct[fast]
-    left[1, :, -1] -= mirrored[fast]
-    left[0, :, -2] -= (march.constants @ now.constant)[fast]
-    real = np.zeros_like(left)  # really sudden changes
-    if change.jump:
-        slow = np.append(np.abs(was.exponent) <= LOWEST * spin, [True, True])
-        pushing = Parts(parts.exponent[slow], parts.shape[:, slow])
-        real[..., slow] = _pushed(pushing, exponent, enter, change.jump * setup.held.momentum)
-    longest = TOUCH * 2.0 * np.pi / spin if mask else np.inf
-    spans = np.minimum(_spans(before, setup, change), longest)
-    taken = 1.0 - left_over(_apart(parts, exponent), *spans, has_touched=has_touched)
-    if has_touched:
-        taken[..., :-2] *= np.abs(was.exponent) <= LOWEST * spin
-    off = -((left - real) * taken).sum(axis=(0, 2))
-    motion = march.begun_motion + (now.motion[:, fast] @ off).real
-    return Place(motion, setup.model.sag, begun.contact_force)
+    (mask, z), old, next_ = before.left, before.setup, march.library
+    if mask != march.moved_by(march.mask) or not isinstance(next_, RangeLibrary):
+        return None
+    place = _inside(setup.held.within(old.spin))
+    common = setup.held.reduced.spin + place * setup.held.reach
+    modes = next_.eigenmodes(march.mask, place)
+    known = before.library.eigenmodes(march.mask, _inside(old.held.within(common)))
+    if modes is None or known is None:
+        return None
+    fast = np.flatnonzero(np.abs(known.exponent) > NEARLY_FAST * abs(setup.spin))
+    entered = modes.enter @ (known.motion[:, fast] @ (z[0, fast] + 1j * z[1, fast])).real
+    if jump:
+        entered = entered + _rung(modes, before, jump, setup)
+    found = np.zeros_like(z)
+    found[:, : entered.size] = entered.real, entered.imag
+    return found
 
 
-def left_over(exponent: Complexes, before: float, after: float, *, has_touched: bool) -> Complexes:
-    """Factor of a gradual change from a time before, s, to one after, relative to a sudden one.
-
-    `exponent` (1/s) is that of the motion minus that of the excited mode.
-    """
-    whole = 0.5 * (before + after)
-    x = exponent * whole
-    x = np.where(np.abs(x) < SLOW, SLOW, x)
-    dying = 2.0 * np.abs(x.real)
-    mean = (np.exp(x - dying) - np.exp(-x - dying)) / (2.0 * x)
-    smooth = mean**3 if has_touched else np.where(np.abs(x.imag) < np.pi, mean, mean**2)
-    turned: Complexes = smooth * np.exp(0.5j * exponent.imag * (after - before))
-    return turned
-
-
-def _spans(before: Standing, new: PieceSetup, change: Change) -> tuple[float, float]:
-    """Times, s, since the speed of the previous matrices, and until that of the next ones.
-
-    Matrices that follow the speed change evenly: a revolution before and after parts slow from fast.
-    """
-    old = before.setup
-    if old.held.is_followed and new.held.is_followed:
-        turn = 2.0 * np.pi / abs(new.spin)
-        return turn, turn
-    speed = 0.5 * (old.spin + new.spin)
-    since, until = (
-        abs((speed - of.held.reduced.spin) / of.held.acceleration) if of.held.acceleration else 0.0
-        for of in (old, new)
-    )
-    since = min(since, change.held_for)
-    return since, min(until, change.ahead if change.jump else max(since, change.ahead))
+def _rung(modes: Eigenmodes, before: Ended, jump: float, setup: PieceSetup) -> Complexes:
+    """What a sudden change of the acceleration adds to coordinates (m,) by sag, force and stiffness."""
+    old, n = before.setup, modes.motion.shape[0] // 2
+    turning = complex(old.clock.growth, old.spin)
+    factor, force = complex(old.speeds.factor[old.place]), old.spin**2 - 1j * before.acceleration
+    project = setup.reduced.project[:, : setup.held.lean.size]
+    moved = -jump * np.concatenate([project @ setup.held.lean, project @ setup.held.slope])
+    none = np.zeros(len(modes.constant))
+    found = modes.entered(moved, none, turning, -1j * jump / force * factor, before.time)
+    whirl = modes.response(turning, factor)[:n] * np.exp(turning * before.time)
+    pushed = 0.5 * modes.enter[:, n:] @ (jump * setup.held.momentum)
+    by_whirl = pushed @ whirl / (turning - modes.exponent)
+    found += by_whirl + pushed @ whirl.conj() / (turning.conjugate() - modes.exponent)
+    return found
 
 
-def _pushed(parts: Parts, exponent: Complexes, enter: Complexes, stiffness: Floats) -> Complexes:
-    """Excitation of each mode by each part and its conjugate, (2, modes, p), as a stiffness acts at once."""
-    n = len(stiffness)
-    given = 0.5 * (enter[:, n:] @ stiffness) @ np.stack([parts.shape[:n], parts.shape[:n].conj()])
-    pushed: Complexes = given / _apart(parts, exponent)
-    return pushed
-
-
-def _apart(parts: Parts, exponent: Complexes) -> Complexes:
-    """Exponents of the parts and of their conjugates minus those of the modes, (2, modes, p)."""
-    both = np.stack([parts.exponent, parts.exponent.conj()])
-    apart: Complexes = both[:, np.newaxis] - exponent[:, np.newaxis]
-    return apart
-
-
-def _turning(setup: PieceSetup) -> tuple[complex, complex]:
-    """Exponent of the unbalance force of a piece (1/s) and the factor of its unbalance (1/s^2)."""
-    return complex(setup.clock.growth, setup.spin), complex(setup.speeds.factor[setup.place])
+def _inside(place: float) -> float:
+    """The place in a range that is nearest."""
+    return min(max(place, -1.0), 1.0)

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.integrate.changing_speed.followed_modes import taken
-from rubhpc.kernels.varying import take_course
+from rubhpc.integrate.changing_speed.mode_courses import taken
+from rubhpc.kernels.courses import take_course
 
 if TYPE_CHECKING:
     from rubhpc.kernels.contact_modes import ModeTables
-    from rubhpc.kernels.retuning import HeldMode
+    from rubhpc.kernels.filling import ModeCourse
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -30,27 +30,27 @@ class Eigenmodes(NamedTuple):
     mirrored_drive: Complexes  # (m,)
 
     @classmethod
-    def of(cls, row: ModeTables, held: HeldMode, within: float, rise: float) -> Eigenmodes:
-        """Eigenmodes of tables that follow the speed, at a place in the range and of the acceleration."""
-        varying, m = held.varying, held.is_pair.size
-        for course in (varying.kept_shape, varying.kept_entry):
-            take_course(course, within, rise, varying.kept)
-        constant = taken(varying.enter_constant, row.enter_constant[0], within, rise)[:, :, :m]
+    def of(cls, row: ModeTables, course: ModeCourse, within: float) -> Eigenmodes:
+        """Eigenmodes of tables that follow the speed, at a place in the range."""
+        courses, m = course.courses, course.is_pair.size
+        for part in (courses.kept_shape, courses.kept_entry):
+            take_course(part, within, courses.kept)
+        constant = taken(courses.enter_constant, row.enter_constant[0], within)[:, :, :m]
         motion, enter = (
-            taken(re, re_of[0], within, rise)[:, :m] + 1j * taken(im, im_of[0], within, rise)[:, :m]
+            taken(re, re_of[0], within)[:, :m] + 1j * taken(im, im_of[0], within)[:, :m]
             for re, im, re_of, im_of in (
-                (varying.motion_re, varying.motion_im, row.motion_re, row.motion_im),
-                (varying.enter_re, varying.enter_im, row.enter_re, row.enter_im),
+                (courses.motion_re, courses.motion_im, row.motion_re, row.motion_im),
+                (courses.enter_re, courses.enter_im, row.enter_re, row.enter_im),
             )
         )
         return cls(
-            exponent=held.exponent[:m].copy(),
-            is_pair=held.is_pair,
+            exponent=course.exponent[:m].copy(),
+            is_pair=course.is_pair,
             motion=motion,
             enter=enter.T,
             constant=constant[:, 0] + 1j * constant[:, 1],
-            drive=held.drive.copy(),
-            mirrored_drive=held.mirrored_drive.copy(),
+            drive=course.drive.copy(),
+            mirrored_drive=course.mirrored_drive.copy(),
         )
 
     def entered(

@@ -1,20 +1,17 @@
-"""Ranges of speed over which contact modes are interpolated from three speeds (`followed_modes`).
+"""Ranges of speed over which contact modes are interpolated from three speeds (`mode_courses`).
 
 At both ends of a range, within it and at resonances the interpolated modes are compared with the matrices
-(`range_errors`). The error of held matrices is of first order in the range, that of interpolated modes of
-third order.
+(`range_errors`). Their errors are of the third order in the range.
 """
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.changing_speed.acceleration_range import BY_ACCELERATION, LEAK, Judge
-from rubhpc.integrate.changing_speed.followed_modes import NODES, aligned, between
-from rubhpc.integrate.changing_speed.held_matrices import NARROWEST
+from rubhpc.integrate.changing_speed.mode_courses import NODES, aligned, between
 from rubhpc.integrate.changing_speed.range_errors import (
     PASSING,
     PLACES,
@@ -41,6 +38,7 @@ if TYPE_CHECKING:
     Ints = NDArray[np.int64]
     Complexes = NDArray[np.complex128]
 
+NARROWEST = 1e-4  # half of the range over the speed
 AT_ENDS = 0.5  # error at the ends of a range over the accuracy; inside it is smaller
 SAFE = 0.9  # share of the widest accurate range
 LEAST, MOST = 0.5, 0.85  # factors by which a range shrinks
@@ -48,14 +46,6 @@ STEEPEST = 5.0  # assumed power of the error in the range
 CLOSE = 1.2  # ratio of an inaccurate and an accurate range at which the search ends
 NEARLY = 1.1  # factor by which an accurate range may be widened by its error, below which the search ends
 GREATEST = 2.0  # factor by which it is widened
-
-
-class Reach(NamedTuple):
-    """A range of speeds and of accelerations."""
-
-    half: float  # rad/s
-    swing: float  # rad/s^2, allowed change of the acceleration where modes do not follow it
-    judge: Judge | None = None  # where modes follow the acceleration too
 
 
 def rotor_of(setup: ModalSetup, matrices: Matrices, phasor: Complexes, seen: Floats) -> Rotor:
@@ -74,46 +64,32 @@ def followed_reach(
     momentum: Floats,
     widest: float,
     *,
+    sense: float,
     accuracy: float,
-    others: tuple[float, float],
     guess: float | None = None,
-) -> Reach:
-    """The widest range that begins at a speed (rad/s), in the direction of the acceleration.
+) -> tuple[float, float]:
+    """Half of the widest range that begins at a speed or is about it, rad/s, and of accelerations, rad/s^2.
 
     Parameters
     ----------
-    acceleration : float, rad/s^2
+    speed, acceleration : float, rad/s, rad/s^2
     momentum : (n, n)
         Change of the stiffness with the acceleration, per rad/s^2.
     widest : float, rad/s
         Half of the range, at most.
+    sense : float
+        1 where the speed rises from there, -1 where it falls, 0 where it is in the middle.
     accuracy : float
-        Relative error of each signal at the ends of the range of accelerations; half of it by the speed.
-    others : (float, float), rad/s^2
-        Least and greatest acceleration that may occur.
+        Relative error of each signal by the acceleration; half of it by the speed.
     guess : float, optional, rad/s
         Half of the range tried first; by default the widest.
     """
-    sense = float(np.sign(acceleration))
     part = _part(rotor, speed, speed + (sense or 1.0) * widest)
     if not part.size:
-        return Reach(widest, _swing(rotor, speed, momentum, accuracy))
+        return widest, _swing(rotor, speed, momentum, accuracy)
     of_part = _of_part(rotor, part)
-    tried = widest, abs(acceleration), AT_ENDS * accuracy, guess
-    half, nodes = _widest_within(of_part, speed, sense, *tried)
-    middle = speed + sense * half
-    turning = momentum[np.ix_(part, part)]
-    swing = _swing(of_part, middle, turning, accuracy)
-    rise = max((other - acceleration for other in others), key=abs)
-    if nodes is None or abs(rise) <= swing:
-        return Reach(half, swing)
-    stiffness, damping = of_part.matrices(middle)
-    risen = _in_order(nodes[0], _modes(stiffness + rise * turning, damping))
-    if risen is None:
-        return Reach(half, swing)
-    at = middle, half, acceleration
-    judge = Judge(of_part, [*nodes, risen], turning, at, rise=rise, accuracy=accuracy)
-    return Reach(half, swing, judge)
+    half = _widest_within(of_part, speed, sense, widest, abs(acceleration), AT_ENDS * accuracy, guess)
+    return half, _swing(of_part, speed + sense * half, momentum[np.ix_(part, part)], accuracy)
 
 
 def _widest_within(
@@ -124,14 +100,14 @@ def _widest_within(
     acceleration: float,
     allowed: float,
     guess: float | None,
-) -> tuple[float, list[tuple[Complexes, Complexes]] | None]:
-    """Half of the widest accurate range, at most `widest` (rad/s), and its modes.
+) -> float:
+    """Half of the widest accurate range, at most `widest` (rad/s).
 
     The first range tried (`guess`, or the widest) is narrowed or widened by its error, until one is nearly as
     wide as possible: by its error, or compared with one that was too wide.
     """
     half, too_wide, least = min(widest, guess or widest), math.inf, NARROWEST * speed
-    best: tuple[float, list[tuple[Complexes, Complexes]]] | None = None
+    best: float | None = None
     while True:
         middle = speed + sense * half
         nodes = _nodes(rotor, middle, half)
@@ -139,19 +115,19 @@ def _widest_within(
         error = _error(rotor, nodes, middle, half, acceleration, enough) if nodes else np.inf
         by_error = SAFE * (allowed / error) ** (1.0 / STEEPEST) if error > 0.0 else np.inf
         if nodes and error <= allowed:
-            best = half, nodes
+            best = half
             if half >= widest or by_error <= NEARLY:
                 return best
             half = min(widest, half * min(by_error, GREATEST))
         elif half <= least:
-            return half, nodes
+            return half
         else:
             too_wide = half
             half *= float(np.clip(by_error, LEAST, MOST))
         if best and too_wide < np.inf:
-            if too_wide <= CLOSE * best[0]:
+            if too_wide <= CLOSE * best:
                 return best
-            half = math.sqrt(best[0] * too_wide)
+            half = math.sqrt(best * too_wide)
 
 
 def _part(rotor: Rotor, speed: float, other: float) -> Ints:
@@ -208,7 +184,7 @@ def _error(
         worst = max(worst, signal_error(rotor, rotor.matrices(speed), modes, speed, growth))
         if worst > enough:
             return worst
-    return max(worst, leak(shapes, middle) * AT_ENDS / LEAK)
+    return max(worst, leak(shapes, middle) * AT_ENDS)
 
 
 def _swing(rotor: Rotor, speed: float, momentum: Floats, accuracy: float) -> float:
@@ -221,7 +197,7 @@ def _swing(rotor: Rotor, speed: float, momentum: Floats, accuracy: float) -> flo
     true = signals_of(rotor, at, answers(stiffness, damping, at, load))
     other = signals_of(rotor, at, answers(stiffness + step * momentum, damping, at, load))
     error = relative(other - true, true)
-    return BY_ACCELERATION * accuracy * step / error if error > 0.0 else np.inf
+    return accuracy * step / error if error > 0.0 else np.inf
 
 
 def _modes(stiffness: Floats, damping: Floats) -> tuple[Complexes, Complexes]:

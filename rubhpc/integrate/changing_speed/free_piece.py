@@ -8,12 +8,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rubhpc.integrate.changing_speed.carried_modes import Change
 from rubhpc.integrate.changing_speed.last_turn import LastTurn
-from rubhpc.integrate.changing_speed.passing import Passed, Passing, energy_of, state_at
+from rubhpc.integrate.changing_speed.passing import Passed, Passing, state_at
 from rubhpc.integrate.changing_speed.pieces import Pieces
-from rubhpc.integrate.changing_speed.twist_ramp import TwistRamp
-from rubhpc.integrate.marches.modal import Place
+from rubhpc.integrate.changing_speed.twist_ramp import TwistRamp, sag_ramp
 from rubhpc.integrate.measuring.samples import lift_samples, new_accumulator
 from rubhpc.integrate.start import start_of
 from rubhpc.kernels.accumulators import (
@@ -31,8 +29,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.changing_speed.carried_modes import Standing
+    from rubhpc.integrate.changing_speed.carried_modes import Ended
     from rubhpc.integrate.changing_speed.piece_setup import PieceSetup
+    from rubhpc.integrate.marches.modal import Place
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.record import State
     from rubhpc.study.drive_law import DriveLaw
@@ -88,8 +87,7 @@ class Spin:
         self._twisting = drive.at(drive.start)
         self._begun: State | Place | None = None
         self._setup: PieceSetup | None = None  # of the last piece
-        self._standing: Standing | None = None  # where it has ended
-        self._held_from = 0.0  # s, since when its matrices are held
+        self._ended: Ended | None = None  # where it has ended
         # The contact forces of the piece before, and how long it took, s.
         self._earlier = new_accumulator(len(model.stators), model.n_place), 0.0
 
@@ -134,8 +132,11 @@ class Spin:
             middle = 0.5 * (low + high)
             slope = drive.slope(mean)
             setup = self._setup = self._pieces.setup(mean, acceleration, first, duration, middle, slope)
-            twist = setup.held.twist
-            ramp = TwistRamp(0.5 * (high - low) * twist, (high - low) / duration * twist)
+            ramp = TwistRamp(*(share * (high - low) * setup.held.twist for share in (0.5, 1.0 / duration)))
+            if setup.held.sagging_models and self._is_open(setup):
+                ramp = ramp.with_sag(
+                    sag_ramp(setup.held, acceleration, self.speed, end_speed, duration), setup
+                )
             if self._begun is None:
                 start = self._initial
                 if isinstance(start, Initial):
@@ -144,13 +145,13 @@ class Spin:
                 else:
                     self._begun = start
             reached = ramp.about_middle(self._begun, setup)
-            begun = self._passing.continued(
-                setup, reached, self._standing, Change(self.time - self._held_from, duration)
+            before = self._ended
+            self._passing.left = before.left if before else None
+            goes_on = before is not None and before.setup.held is setup.held and setup.held.is_followed
+            goes_on = goes_on or self._passing.goes_over(setup, reached, before)
+            passed = self._passing.take(
+                setup, length, reached, self._earlier, is_balanced=True, goes_on=goes_on
             )
-            carried = 0.0  # J
-            if isinstance(begun, Place) and isinstance(reached, Place) and begun is not reached:
-                carried = energy_of(begun, setup) - energy_of(reached, setup)
-            passed = self._passing.take(setup, length, begun, self._earlier, is_balanced=True)
             lift_samples(passed.whole, setup.model)
             ramp.lift(passed.whole, setup)
             if passed.reason:
@@ -163,11 +164,11 @@ class Spin:
             last_turn.note_rub(at, length, abs(flows[FRICTION_LOSS]))
             if may_be_halved and _is_uneven(rubbed, duration, length, per_revolution):
                 return None
-            before = self._momentum(state_at(reached, setup), first)
-            after = self._momentum(state_at(passed.end, setup), last)
-            turning = acceleration * 0.5 * duration * (before[1] + after[1])
-            given = torque * turned + turning - flows[UNBALANCE_WORK] - flows[DRIVE_WORK] - carried
-            change = self._change(given, sum(before), sum(after))
+            at_first = self._momentum(state_at(reached, setup), first)
+            at_last = self._momentum(state_at(passed.end, setup), last)
+            turning = acceleration * 0.5 * duration * (at_first[1] + at_last[1])
+            given = torque * turned + turning - flows[UNBALANCE_WORK] - flows[DRIVE_WORK]
+            change = self._change(given, sum(at_first), sum(at_last))
             if not math.isfinite(change):
                 return None
             error = abs(change / duration - acceleration) * duration**2 / 12.0
@@ -182,12 +183,12 @@ class Spin:
                 return None
         held = [
             inertia * 0.5 * speed**2 + speed * sum(carried_by)
-            for speed, carried_by in ((self.speed, before), (self.speed + change, after))
+            for speed, carried_by in ((self.speed, at_first), (self.speed + change, at_last))
         ]
         energies = np.array(
             [
                 held[1] - held[0],
-                passed.gained + carried,
+                passed.gained,
                 torque * turned + turning,
                 flows[FRICTION_LOSS],
                 flows[DAMPING_LOSS],
@@ -198,15 +199,17 @@ class Spin:
         self.speed += change
         if not self.speed > 0.0:
             return None
-        if self._standing is None or self._standing.setup.held is not setup.held:
-            self._held_from = self.time
-        self._standing = self._passing.standing(setup, passed.end, length)
+        self._ended = self._passing.ended(setup, length, acceleration)
         self.time += duration
         last_turn.note_torque(at, length, torque - inertia * change / duration)
         self._twisting = high
         self._begun = ramp.after(passed.end, setup)
         self._earlier = passed.accumulators[-1], duration
         return found
+
+    def _is_open(self, setup: PieceSetup) -> bool:
+        """Whether nothing touches as a piece begins, about the sag of its middle too."""
+        return self._begun is not None and self._passing.is_open(self._begun, setup)
 
     def _taken(
         self,

@@ -6,21 +6,29 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.changing_speed.followed_modes import EXACT, JUDGED, LEAST, Entries, between, shares_of
-from rubhpc.integrate.changing_speed.near_modes import most_of, weights
+from rubhpc.integrate.changing_speed.mode_courses import (
+    EXACT,
+    JUDGED,
+    LEAST,
+    Entries,
+    between,
+    most_of,
+    shares_of,
+    weights,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.changing_speed.followed_modes import Node
+    from rubhpc.integrate.changing_speed.mode_courses import Node
 
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
 
 
-def entries(nodes: Sequence[Node], risen: Node | None) -> Entries:
+def entries(nodes: Sequence[Node]) -> Entries:
     """What enters a mode between `NODES`: inverses of its shapes, in the coordinates of those in the middle.
 
     A mode that stands for a pair has two coordinates here, real and imaginary part, so that all is real but
@@ -29,13 +37,8 @@ def entries(nodes: Sequence[Node], risen: Node | None) -> Entries:
     mode, n_node = nodes[0].mode, len(nodes)
     m, is_pair = mode.n_eigenmode, weights(mode) > 1.5
     paired = np.flatnonzero(is_pair)
-    of_all = [*nodes[1:], *([risen] if risen else [])]
-    change = np.array([node.mode.motion for node in of_all]) - mode.motion
-    places = [shares_of(place, n_node) for place in EXACT]
-    shares = np.zeros((len(places) + bool(risen), len(change)))
-    shares[: len(places), : n_node - 1] = places
-    if risen:
-        shares[-1, -1] = 1.0
+    change = np.array([node.mode.motion for node in nodes[1:]]) - mode.motion
+    shares = np.array([shares_of(place, n_node) for place in EXACT])
     is_moved = (change[..., :m] != 0.0).any(axis=(0, 1))
     columns = np.flatnonzero(np.append(is_moved, is_moved[paired]))
     every = _in_parts(mode.enter[:m].T, is_pair, 1.0).T
@@ -50,12 +53,11 @@ def entries(nodes: Sequence[Node], risen: Node | None) -> Entries:
     unit = np.eye(both.size)
 
     def turned(shares: Floats) -> Floats:
-        return (shares @ mixed.reshape(len(mixed), -1)).reshape(-1, *unit.shape) + unit
+        return np.tensordot(shares, mixed, axes=1) + unit
 
     back = np.linalg.inv(turned(shares[1:]))
-    through = [unit, *back[: len(EXACT) - 1]]
-    judged = np.zeros((len(JUDGED), len(change)))
-    judged[:, : n_node - 1] = [shares_of(place, n_node) for place in JUDGED]
+    through = [unit, *back]
+    judged = np.array([shares_of(place, n_node) for place in JUDGED])
     lost = max(
         most_of(between(through, place) @ kept - unit)
         for place, kept in zip(JUDGED, turned(judged), strict=True)

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.integrate.case import march_of
-from rubhpc.integrate.changing_speed.carried_modes import Change, Standing, carried, standing
+from rubhpc.integrate.changing_speed.carried_modes import Ended, carried
 from rubhpc.integrate.changing_speed.piece_setup import with_values
-from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary
+from rubhpc.integrate.changing_speed.range_library import RangeLibrary
 from rubhpc.integrate.changing_speed.stretch import Stretch, begin_stretch, take_stretch
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
@@ -55,7 +55,7 @@ class Passing:
         self._case = clearance, friction
         self._check, self._say = check, say
         self._march: EventDrivenMarch | None = None
-        self._left: tuple[int, Floats] | None = None  # end of the last piece, in modal coordinates
+        self.left: tuple[int, Floats] | None = None  # end of the last piece, in modal coordinates
         self._lasted = 0.0  # s, duration of that piece
         self._room: dict[int, Samples] = {}  # by number of samples of a piece
         self._at: PieceSetup | None = None  # the piece at whose beginning the march is
@@ -96,20 +96,37 @@ class Passing:
             self._check()
             self._say(f"a case at {setup.spin * 30.0 / math.pi:.0f} rpm")
 
-    def continued(
-        self, setup: PieceSetup, begun: State | Place, before: Standing | None, change: Change
-    ) -> State | Place:
-        """Start of a piece after one with other matrices, or at another acceleration that these follow.
+    def goes_over(
+        self, setup: PieceSetup, begun: State | Place, before: Ended | None, jump: float = 0.0
+    ) -> bool:
+        """Whether fast modes go on from a piece before, of another range or acceleration, into the next one.
 
-        The height of a curved gap depends on the motion, which must not change while the gap is closed.
+        `jump` (rad/s^2) is a sudden change of the acceleration. The height of a curved gap depends on the
+        motion, which must not change while the gap is closed.
         """
-        if self._march is None or before is None or not isinstance(begun, Place):
-            return begun
-        if before.setup.held is setup.held and not setup.held.is_followed:
-            return begun
-        if not self._march.has_closed_form and (begun.contact_force > 0.0).any():
-            return begun
-        return carried(before, change, self._march, setup, begun)
+        march = self._march
+        if march is None or before is None or not isinstance(begun, Place):
+            return False
+        if not march.has_closed_form and (begun.contact_force > 0.0).any():
+            return False
+        if not (before.setup.held.is_followed and setup.held.is_followed):
+            return False
+        try:
+            march.begin(setup, begun)
+        except NoClosedForm:
+            return False
+        z = carried(before, jump, march, setup)
+        if z is not None:
+            self.left = before.left[0], z
+        return z is not None
+
+    def ended(self, setup: PieceSetup, n_sample: int, acceleration: float) -> Ended | None:
+        """End of the last piece in its own modes, if it has any; its acceleration is in rad/s^2."""
+        library = None if self._march is None else self._march.library
+        if self.left is None or not isinstance(library, RangeLibrary):
+            return None
+        mask, z = self.left
+        return Ended(setup, library, (mask, z.copy()), setup.interval * n_sample, acceleration)
 
     def is_open(self, begun: State | Place, setup: PieceSetup) -> bool:
         """Whether nothing touches as a piece begins, about the sag of its middle too."""
@@ -120,12 +137,6 @@ class Passing:
         if self._march is None:
             return False
         return bool((self._march.gaps(setup, begun) >= 0.0).all())
-
-    def standing(self, setup: PieceSetup, end: State | Place, n_sample: int) -> Standing | None:
-        """End of the last piece in its own modes, if it has any."""
-        if self._march is None or not isinstance(end, Place):
-            return None
-        return standing(self._march, setup, end, setup.interval * n_sample)
 
     def take_several(
         self,
@@ -143,7 +154,7 @@ class Passing:
         if self._check is not None:
             self._check()
         room = self._room_for(block.model, n_sample)
-        left = self._left if goes_on else None
+        left = self.left if goes_on else None
         march, setup = self._march, block[first]
         try:
             library = begin_stretch(march, setup, begun, self._longer(setup, n_sample), left)
@@ -158,7 +169,7 @@ class Passing:
 
         found = take_stretch(march, library, block, first, room, begun, earlier, look)
         if found is not None:
-            self._left, self._lasted = found.left, float(block.interval[first + found.n_piece - 1]) * n_sample
+            self.left, self._lasted = found.left, float(block.interval[first + found.n_piece - 1]) * n_sample
         return found
 
     def _longer(self, setup: PieceSetup, n_sample: int) -> float:
@@ -184,15 +195,15 @@ class Passing:
             self._march = made
             if goes_on:
                 mask, z = made.reached_in()
-                self._left = mask, np.zeros_like(z)
+                self.left = mask, np.zeros_like(z)
                 self._keep_fast(made, setup, n_sample)
         return made
 
     def _keep_fast(self, march: EventDrivenMarch, setup: PieceSetup, n_sample: int) -> None:
         """Let fast modes that follow the speed continue unchanged."""
         library = march.library
-        if self._left is not None and isinstance(library, RetunedLibrary) and library.follows(march.mask):
-            march.keep_fast(self._left, setup.spin, self._longer(setup, n_sample))
+        if self.left is not None and isinstance(library, RangeLibrary) and library.follows(march.mask):
+            march.keep_fast(self.left, setup.spin, self._longer(setup, n_sample))
 
     def _pass(
         self,
@@ -217,7 +228,7 @@ class Passing:
             if reason is not None:
                 break
         gained = march.energy() - before if is_balanced else math.nan
-        self._left = march.reached_in() if isinstance(march, EventDrivenMarch) else None
+        self.left = march.reached_in() if isinstance(march, EventDrivenMarch) else None
         self._lasted = setup.interval * n_sample
         return Passed(samples.whole, accumulators, march.n_step, march.reached(), gained, reason or "")
 
@@ -246,10 +257,3 @@ def state_at(begun: State | Place, setup: PieceSetup) -> State:
     displacement, velocity = (setup.reduced.basis @ begun.motion.reshape(2, -1).T).T.copy()
     displacement[: begun.sag.size] += begun.sag
     return State.of_bodies(setup.model, displacement, velocity, begun.contact_force)
-
-
-def energy_of(begun: Place, setup: PieceSetup) -> float:
-    """Mechanical energy, J, of the motion at the beginning of a piece, about its sag."""
-    (displacement, velocity), moved = begun.motion.reshape(2, -1), begun.sag - setup.model.sag
-    displacement = displacement + setup.reduced.project[:, : moved.size] @ moved
-    return float(0.5 * (velocity @ velocity + displacement @ setup.reduced.stiffness @ displacement))

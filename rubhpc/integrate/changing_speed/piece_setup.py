@@ -10,11 +10,10 @@ import numpy as np
 
 from rubhpc.fem.probes import probes_at, seen_at_rest
 from rubhpc.fem.statics import at_rest_under
-from rubhpc.integrate.changing_speed.followed_modes import between
-from rubhpc.integrate.changing_speed.retuned_curved import RetunedCurvedLibrary
-from rubhpc.integrate.changing_speed.retuned_laws import RetunedFrictionLibrary, RetunedPenaltyLibrary
-from rubhpc.integrate.changing_speed.retuned_modes import AT_ONCE, Desk, RetunedLibrary
-from rubhpc.integrate.changing_speed.retuned_soft_friction import RetunedSoftFrictionLibrary
+from rubhpc.integrate.changing_speed.mode_courses import between
+from rubhpc.integrate.changing_speed.range_curved import RangeCurvedLibrary
+from rubhpc.integrate.changing_speed.range_laws import RangeFrictionLibrary, RangePenaltyLibrary
+from rubhpc.integrate.changing_speed.range_library import AT_ONCE, RangeLibrary, TableBuffer
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.reduced_model.penalty_mode import Penalty
 from rubhpc.integrate.reduced_model.reduction import directions
@@ -26,19 +25,18 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.changing_speed.acceleration_range import Judge
     from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
     from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs
     from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
     from rubhpc.integrate.reduced_model.system_modes import Solved
     from rubhpc.kernels.contact_modes import Reduced
-    from rubhpc.kernels.retuning import Speeds
+    from rubhpc.kernels.filling import Speeds
 
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
 
-R = TypeVar("R", bound=RetunedLibrary)
+R = TypeVar("R", bound=RangeLibrary)
 D = TypeVar("D")
 
 
@@ -46,8 +44,8 @@ class HeldMatrices:
     """Matrices at a speed, rad/s, and an acceleration, rad/s^2, with their solved contact modes.
 
     `momentum` (n, n) is the change of the stiffness with the acceleration, per rad/s^2. `beside` are the
-    model and its matrices at other speeds of the range (`followed_modes.NODES`), through which they follow
-    the speed; none where they are constant. `judge` decides which accelerations they follow.
+    model and its matrices at other speeds of the range (`mode_courses.NODES`), through which they follow
+    the speed; none where they are constant.
     """
 
     template: PieceSetup  # set-up to copy for the speed of a piece
@@ -64,23 +62,22 @@ class HeldMatrices:
         slope: float,
         reach: tuple[float, float],
         sample_level: int,
-        desks: dict[tuple[object, ...], Desk],
+        buffers: dict[tuple[object, ...], TableBuffer],
         beside: Sequence[tuple[Model, ReducedModel]] = (),
-        judge: Judge | None = None,
     ) -> None:
-        self._judge = judge
-        self._desks, self._beside = desks, beside
+        self._buffers, self._beside = buffers, beside
         self.model, self.reduced = model, reduced
         self.at_hand = reduced  # at the speed of the current piece
         self.twist = self.lean = np.zeros(model.sag.size)  # sag under 1 N m of a drive; under 1 rad/s^2
-        self.sagging_models: list[Model] = []  # at `followed_modes.NODES`, where the sag depends on the speed
+        self.slope = np.zeros(model.sag.size)  # change of the sag with the speed
+        self.sagging_models: list[Model] = []  # at `mode_courses.NODES`, where the sag depends on the speed
         self.kept = KeptParts()
         self.bodies: dict[float, Reduced] = {}  # of each friction, without what a piece changes
         self.sample_level = sample_level  # of the lowest speed
         self.acceleration, self.momentum = acceleration, momentum
         self._phasor, self._reach = phasor, reach
         self._slope = slope  # N m s, of a drive's torque over the speed
-        self._libraries: dict[tuple[str, float], RetunedLibrary] = {}
+        self._libraries: dict[tuple[str, float], RangeLibrary] = {}
         self._pairs: dict[float, FrictionPairs] = {}
         self._latest: tuple[tuple[float, ...], Model] | None = None  # by request
         self.first: tuple[tuple[float, ...], object] | None = None  # block of a case, by what was asked
@@ -100,25 +97,7 @@ class HeldMatrices:
         far, changed = self._reach
         if abs(speed - self.reduced.spin) > far or slope != self._slope:
             return False
-        if self.risen is not None:
-            assert self._judge is not None
-            return acceleration == self.acceleration or self._judge.serves(acceleration)
         return abs(acceleration - self.acceleration) <= changed
-
-    @cached_property
-    def risen(self) -> ReducedModel | None:
-        """The matrices in the middle of the range at another acceleration, which they follow too."""
-        change = self._judge.rise if self._judge and self._beside else 0.0
-        if not change:
-            return None
-        return with_values(self.reduced, stiffness=self.reduced.stiffness + change * self.momentum)
-
-    def rise(self, acceleration: float) -> float:
-        """Place of an acceleration, rad/s^2: 0 for that of the matrices, 1 for that of `risen`."""
-        if self.risen is None:
-            return 0.0
-        assert self._judge is not None
-        return (acceleration - self.acceleration) / self._judge.rise
 
     @property
     def reach(self) -> float:
@@ -134,18 +113,16 @@ class HeldMatrices:
         """Place of a speed (rad/s) in the range, from -1 to 1."""
         return (speed - self.reduced.spin) / self.reach
 
-    def at_place(self, within: float, rise: float) -> ReducedModel:
-        """The model at a place in the range and of the acceleration; its unbalance is that of the middle."""
+    def at_place(self, within: float) -> ReducedModel:
+        """The model at a place in the range; its unbalance is that of the middle."""
         if not self._beside:
             return self.reduced
         values = {name: between(nodes, within) for name, nodes in self._at_nodes.items()}
-        if self.risen is not None and rise:
-            values["stiffness"] += rise * (self.risen.stiffness - self.reduced.stiffness)
         return with_values(self.reduced, **values)
 
     @cached_property
     def _at_nodes(self) -> dict[str, list[Floats]]:
-        """Arrays of the model that depend on the speed, at `followed_modes.NODES`."""
+        """Arrays of the model that depend on the speed, at `mode_courses.NODES`."""
         nodes = [self.reduced, *(reduced for _, reduced in self._beside)]
         return {name: [getattr(node, name) for node in nodes] for name in ("stiffness", "damping", "probe")}
 
@@ -186,10 +163,10 @@ class HeldMatrices:
                 tick=piece.tick,
                 sample_level=piece.sample_level,
                 n_level=piece.n_level,
-                desks=self._desks,
+                reach=self.reach,
+                buffers=self._buffers,
                 beside=[reduced for _, reduced in self._beside],
                 at_place=self.at_place,
-                risen=self.risen,
                 is_balanced=self.is_balanced,
                 at_once=self.at_once,
                 **make(),
@@ -226,9 +203,9 @@ class PieceSetup(ModalSetup):
         return self.held.sample_level
 
     @property
-    def places(self) -> tuple[float, float]:
-        """Place of the speed in the range of the matrices, from -1 to 1, and that of the acceleration."""
-        return float(self.speeds.within[self.place]), float(self.speeds.rise[self.place])
+    def within(self) -> float:
+        """Place of the speed in the range of the matrices, from -1 to 1."""
+        return float(self.speeds.within[self.place])
 
     def goes_on_in(self, other: PieceSetup, acceleration: float, next_acceleration: float) -> bool:
         """Whether the next piece has matrices of the same range that follow the speed."""
@@ -275,7 +252,7 @@ class PieceSetup(ModalSetup):
 
     def library(self, friction: float) -> ModeLibrary:
         """Contact modes of a friction, valid until another piece requests them."""
-        return self.held.tuned(RetunedLibrary, self, friction, dict)
+        return self.held.tuned(RangeLibrary, self, friction, dict)
 
     def curved_library(self, friction: float) -> CurvedLibrary:
         """The same with tables for curved gaps."""
@@ -285,7 +262,7 @@ class PieceSetup(ModalSetup):
             return {"at_piece": lambda: held.at_hand}
 
         held.at_hand = self.reduced
-        return held.tuned(RetunedCurvedLibrary, self, friction, at_piece)
+        return held.tuned(RangeCurvedLibrary, self, friction, at_piece)
 
     def penalty_library(self, friction: float) -> ModeLibrary:
         """The same under a penalty."""
@@ -295,7 +272,7 @@ class PieceSetup(ModalSetup):
             law = self.law
             return {"penalty": Penalty(law.stiffness, law.damping, gap_jacobian, force_direction)}
 
-        return self.held.tuned(RetunedPenaltyLibrary, self, friction, penalty)
+        return self.held.tuned(RangePenaltyLibrary, self, friction, penalty)
 
     def friction_pairs(self, friction: float) -> FrictionPairs:
         """The pairs of a friction."""
@@ -311,8 +288,7 @@ class PieceSetup(ModalSetup):
             rim_speed = radius * abs(self.held.reduced.spin)
             return {"pairs": replace(self.friction_pairs(friction), rim_speed=rim_speed)}
 
-        kind = RetunedSoftFrictionLibrary if self.law.stiffness else RetunedFrictionLibrary
-        return self.held.tuned(kind, self, friction, pairs)
+        return self.held.tuned(RangeFrictionLibrary, self, friction, pairs)
 
 
 def with_values(instance: D, **values: Any) -> D:

@@ -10,7 +10,7 @@ import numpy as np
 
 from rubhpc.integrate.changing_speed.block import Block
 from rubhpc.integrate.changing_speed.mode_parts import speeds_of
-from rubhpc.integrate.changing_speed.retuned_modes import AT_ONCE
+from rubhpc.integrate.changing_speed.range_library import AT_ONCE
 from rubhpc.integrate.changing_speed.ripples import Ripples
 from rubhpc.integrate.changing_speed.speed_ranges import SpeedRanges
 
@@ -31,8 +31,8 @@ MOST_HELD = 4  # matrices at hand, of a spin that swings between them
 MOST_BYTES = 3 * 2**29  # of contact modes that are kept, with their matrices, for other cases
 MOST_DRIVEN_BYTES = 2**27  # the same of a free spin, whose cases have few speeds in common
 
-# Of each set-up, the matrices by speed, acceleration, slope of the torque, the accelerations to come and the
-# range before, the latest last, for other cases too.
+# Of each set-up, the matrices by speed, acceleration, slope of the torque and the range before, the latest
+# last, for other cases too.
 _KNOWN: WeakKeyDictionary[ModalSetup, dict[tuple[object, ...], HeldMatrices]] = WeakKeyDictionary()
 
 _RIPPLES: WeakKeyDictionary[ModalSetup, Ripples] = WeakKeyDictionary()
@@ -79,11 +79,8 @@ class Pieces:
 
         As `setup`, (n_piece,) each; `n_sample` are the samples in each piece, the same in those together.
         """
-        least = np.minimum.accumulate(acceleration[::-1])[::-1].tolist()  # from each piece on
-        greatest = np.maximum.accumulate(acceleration[::-1])[::-1].tolist()
         first = 0
         while first < speed.size:
-            self._ranges.accelerations = least[first], greatest[first]
             held, last = self._find(float(speed[first]), float(acceleration[first])), first + 1
             at_once = SAGGING_AT_ONCE if held.sagging_models else AT_ONCE
             while (
@@ -116,10 +113,8 @@ class Pieces:
         force = np.stack([phasor.real, -phasor.imag], axis=1)
         interval = 2.0 * math.pi / (np.abs(speed) * self._fastest.samples_per_revolution)
         tick = interval / (1 << held.sample_level)
-        rise = held.rise(float(acceleration[0]))
-        speeds = speeds_of(
-            speed, factor, growth, tick, held.reduced.spin, held.sample_level, held.reach, rise
-        )
+        at_middle = held.reduced.spin, held.sample_level, held.reach
+        speeds = speeds_of(speed, factor, growth, tick, *at_middle)
         longest = np.floor(np.log2(held.template.step / tick)).astype(int)
         search_level = np.clip(longest, 0, held.sample_level)
         found = Block(held, model, speeds, force, search_level, interval)
@@ -136,7 +131,7 @@ class Pieces:
                 return held
         known = _KNOWN.setdefault(self._fastest, {})
         guess = self._held[0].reach if self._held else None
-        asked = speed, acceleration, slope, self._ranges.accelerations, guess
+        asked = speed, acceleration, slope, guess
         found = known.pop(asked, None) or self._ranges.hold(speed, acceleration, slope, guess)
         if self._make_room(known):
             known[asked] = found

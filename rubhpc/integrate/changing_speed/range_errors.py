@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rubhpc.integrate.changing_speed.followed_modes import EQUAL, EXACT, JUDGED, between
+from rubhpc.integrate.changing_speed.mode_courses import EQUAL, EXACT, JUDGED, between
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -55,27 +55,12 @@ def signal_error(
 
 
 def leak(shapes: list[Complexes], speed: float) -> float:
-    """Relative change of a motion that enters shapes by the interpolated inverse."""
-    inverses = inverses_of(shapes)
-    return max(lost_by(between(shapes, place), between(inverses, place), speed) for place in JUDGED)
-
-
-def inverses_of(shapes: list[Complexes]) -> list[Complexes]:
-    """Inverses at `EXACT` of the interpolated shapes."""
-    return [inverse_of(between(shapes, place)) for place in EXACT]
-
-
-def inverse_of(shape: Complexes) -> Complexes:
-    """Inverse of shapes (2 n, 2 n)."""
-    return np.linalg.inv(shape).astype(np.complex128)
-
-
-def lost_by(shape: Complexes, entered: Complexes, speed: float) -> float:
-    """Relative change of a motion that enters shapes (2 n, 2 n) by `entered`."""
-    n = len(shape)
+    """Relative change of a motion that enters shapes (2 n, 2 n) by the interpolated inverse."""
+    inverses = [np.linalg.inv(between(shapes, place)).astype(np.complex128) for place in EXACT]
+    n = len(shapes[0])
     scale = np.repeat([speed, 1.0], n // 2)
-    off = (shape @ entered - np.eye(n)) * scale[:, np.newaxis] / scale
-    return float(np.abs(off).max())
+    lost = [between(shapes, place) @ between(inverses, place) - np.eye(n) for place in JUDGED]
+    return max(float(np.abs(off * scale[:, np.newaxis] / scale).max()) for off in lost)
 
 
 def resonances(nodes: list[tuple[Complexes, Complexes]], middle: float, half: float) -> list[float]:

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.fem.free_spin import unit_rotation
-from rubhpc.integrate.changing_speed.carried_modes import Change
 from rubhpc.integrate.changing_speed.passing import Passing, state_at
 from rubhpc.integrate.changing_speed.pieces import Pieces
 from rubhpc.integrate.changing_speed.sample_times import bring_to_angles
@@ -34,7 +33,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.changing_speed.piece_setup import PieceSetup
+    from rubhpc.integrate.changing_speed.carried_modes import Ended
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.kernels.accumulators import Accumulator
     from rubhpc.study.speed_law import SpeedLaw
@@ -137,14 +136,14 @@ def integrate_run_up(
     lag = (accelerations * durations**2 / 12.0)[is_even]
     advice = pieces.ripples.advice(speeds[is_even], sizes[is_even] / per_revolution, lag, signal_names(model))
     unit, none = unit_rotation(model.rotor), np.zeros(model.rotor.n_dof)
-    piece, held_from = 0, times[0]  # time from which the matrices are held
-    last: tuple[PieceSetup, int] | None = None  # piece of the matrices before, and its samples
+    piece = 0
+    ended: Ended | None = None  # the last piece
     for block in pieces.blocks(speeds, accelerations, angles[:-1], durations, sizes):
         setup, size, begins_at = block[0], int(sizes[piece]), piece
         if setup.model is not sagging:
             lift_samples(whole[:, begun : cuts[piece]], sagging)
             sagging, begun = setup.model, cuts[piece]
-        goes_on = last is not None and last[0].goes_on_in(
+        goes_on = ended is not None and ended.setup.goes_on_in(
             setup, float(accelerations[piece - 1]), float(accelerations[piece])
         )
         is_first = reached is None
@@ -161,17 +160,9 @@ def integrate_run_up(
                 reached = ramp.about_middle(reached, setup)
             elif not goes_on:  # at rest, while the sag moves
                 reached = moved(reached, setup, none, -ramp.rate)
-        if last is not None and not goes_on and (last[0].held is not setup.held or setup.held.is_followed):
-            ended = passing.standing(last[0], reached, last[1])
-            # Ringing by a jump of the acceleration is not caused by the matrices.
-            jump = float(accelerations[piece] - accelerations[piece - 1])
-            change = Change(times[piece] - held_from, durations[piece], jump)
-            leant = jump * setup.held.lean
-            reached = moved(reached, setup, leant, none)
-            reached = passing.continued(setup, reached, ended, change)
-            reached = moved(reached, setup, -leant, none)
-            if last[0].held is not setup.held:
-                held_from = times[piece]
+        if ended is not None and not goes_on:
+            jump = float(accelerations[piece]) - ended.acceleration
+            goes_on = passing.goes_over(setup, reached, ended, jump)
         while not reason and (place := piece - begins_at) < len(block):
             first = int(cuts[piece])
             note(first / cuts[-1])
@@ -209,7 +200,7 @@ def integrate_run_up(
                 reached = ramp.after(reached, setup)
         if reason:
             break
-        last = block.last, size
+        ended = passing.ended(block.last, size, float(accelerations[piece - 1]))
     lift_samples(whole[:, begun : n_done * per_revolution], sagging)
     n_sample = n_done * per_revolution
     taken = np.unique(np.minimum(cuts, n_sample))

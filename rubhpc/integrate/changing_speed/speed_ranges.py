@@ -11,14 +11,8 @@ import numpy as np
 from rubhpc.fem.free_spin import unit_rotation
 from rubhpc.fem.probes import probes_at
 from rubhpc.fem.statics import at_rest_under, sag_under
-from rubhpc.integrate.changing_speed.followed_modes import NODES
-from rubhpc.integrate.changing_speed.followed_range import followed_reach, rotor_of
-from rubhpc.integrate.changing_speed.held_matrices import (
-    NARROWEST,
-    WIDEST,
-    WIDEST_TABULATED,
-    held_range,
-)
+from rubhpc.integrate.changing_speed.followed_range import NARROWEST, followed_reach, rotor_of
+from rubhpc.integrate.changing_speed.mode_courses import NODES
 from rubhpc.integrate.changing_speed.mode_parts import speeds_of
 from rubhpc.integrate.changing_speed.piece_setup import HeldMatrices, PieceSetup, sagging
 from rubhpc.integrate.changing_speed.ripples import Linear
@@ -28,19 +22,18 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.changing_speed.acceleration_range import Judge
-    from rubhpc.integrate.changing_speed.followed_range import Reach
-    from rubhpc.integrate.changing_speed.retuned_modes import Desk
+    from rubhpc.integrate.changing_speed.range_library import TableBuffer
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
 
     Floats = NDArray[np.float64]
 
-SPEED_STEP = 1e-3  # relative, over which the change of the matrices with the speed is taken
+WIDEST = 0.5  # half of the range over the speed
+WIDEST_TABULATED = 0.16  # the same where bearings follow a table, not a straight line
 LONGEST_FALL = 1.0 / 3.0  # half of the range over the first speed of a coast-down, which stays above 0
-DRIVEN_SHARE = 0.25  # of the accuracy, of matrices of a driven rotor, whose twist errs most
+DRIVEN_SHARE = 0.25  # of the accuracy, of modes of a driven rotor, whose twist errs most
 
-_DESKS: WeakKeyDictionary[ModalSetup, dict[tuple[object, ...], Desk]] = WeakKeyDictionary()
+_BUFFERS: WeakKeyDictionary[ModalSetup, dict[tuple[object, ...], TableBuffer]] = WeakKeyDictionary()
 
 
 class SpeedRanges:
@@ -53,7 +46,6 @@ class SpeedRanges:
     def __init__(self, fastest: ModalSetup) -> None:
         self._of = ref(fastest)  # `Ripples`, which are kept by set-up, would keep it forever
         self._basis = fastest.reduced.basis
-        self.accelerations: tuple[float, float] | None = None  # rad/s^2, least and greatest to come
         model = fastest.model
         rotor = model.rotor
         self._inertia = rotor.mass @ unit_rotation(rotor)
@@ -77,25 +69,18 @@ class SpeedRanges:
     def hold(
         self, speed: float, acceleration: float, slope: float, guess: float | None = None
     ) -> HeldMatrices:
-        """Matrices for a speed at the near end of the range over which they may be held.
+        """Matrices of the range that begins at a speed.
 
         That of a free spin, which may turn back, is in the middle of the range. `guess` (rad/s) is half of
         the range tried first.
         """
         fastest, free = self._fastest, self._fastest.free_spin
-        is_followed = free is None
-        judge: Judge | None = None
-        if is_followed:
-            reach, swing, judge = self._followed_reach(speed, acceleration, guess)
-        else:
-            reach, swing = self._held_reach(speed, acceleration, slope)
+        reach, swing = self._reach(speed, acceleration, slope, guess)
         if free is None:
             speed += np.sign(acceleration) * reach
         about = acceleration, slope, speed
         model, reduced = self._reduced(speed, *about)
-        beside = [
-            self._reduced(speed + place * reach, *about) for place in (NODES[1:] if is_followed else ())
-        ]
+        others = beside = [self._reduced(speed + place * reach, *about) for place in NODES[1:]]
         if all(np.array_equal(other.stiffness, reduced.stiffness) for _, other in beside) and all(
             np.array_equal(other.damping, reduced.damping) for _, other in beside
         ):
@@ -103,16 +88,15 @@ class SpeedRanges:
         near_end = reach * (1.0 + 1e-9)  # rounding apart
         slowest = replace(fastest, spin=abs(speed) - reach)
         ranges = near_end, swing
-        desks = _DESKS.setdefault(fastest, {})
+        buffers = _BUFFERS.setdefault(fastest, {})
         at = acceleration, slope, ranges
         held = HeldMatrices(
-            model, reduced, self.phasor, self._momentum, *at, slowest.sample_level, desks, beside, judge
+            model, reduced, self.phasor, self._momentum, *at, slowest.sample_level, buffers, beside
         )
-        held.is_balanced = not is_followed
+        held.is_balanced = free is not None
         if free is not None:
             held.at_once = 1  # the speed after a piece follows from its energies
-        if free is None and fastest.model.rotor.tabulated_speeds:
-            others = beside or [self._reduced(speed + place * reach, *about) for place in NODES[1:]]
+        if fastest.model.rotor.tabulated_speeds:
             held.sagging_models = [model, *(other for other, _ in others)]
         held.template = PieceSetup(
             scheme=fastest.scheme,
@@ -136,14 +120,12 @@ class SpeedRanges:
         tilted = model.rotor.gyroscopic @ model.sag
         if free is not None:
             held.twist = sag_under(model.rotor, -free.share)
-            held.lean = sag_under(model.rotor, -0.5 * tilted)
-        else:
-            force = -self._inertia - tilted
-            if held.sagging_models:  # dampers act against the rate of the sag
-                rotor, (_, below, above) = model.rotor, held.sagging_models
-                rate = (above.sag - below.sag) / ((NODES[2] - NODES[1]) * reach)
-                force = force - (rotor.damping + speed * rotor.gyroscopic) @ rate
-            held.lean = sag_under(model.rotor, force)
+        force = -self._inertia - tilted if free is None else -0.5 * tilted
+        if held.sagging_models:  # dampers act against the rate of the sag
+            rotor, (_, below, above) = model.rotor, held.sagging_models
+            held.slope = (above.sag - below.sag) / ((NODES[2] - NODES[1]) * reach)
+            force = force - (rotor.damping + speed * rotor.gyroscopic) @ held.slope
+        held.lean = sag_under(model.rotor, force)
         return held
 
     def linear(self, speed: float, *, is_whole: bool = False) -> Linear:
@@ -179,58 +161,37 @@ class SpeedRanges:
             reduced.__dict__[name] = getattr(fastest.reduced, name)
         return model, reduced
 
-    def _followed_reach(self, speed: float, acceleration: float, guess: float | None) -> Reach:
-        """The range in which modes follow the speed."""
+    def _reach(
+        self, speed: float, acceleration: float, slope: float, guess: float | None
+    ) -> tuple[float, float]:
+        """Half of the range in which modes follow the speed, rad/s, and of accelerations, rad/s^2."""
+        fastest = self._fastest
+        model, is_free = fastest.model, fastest.free_spin is not None
 
         def matrices(at: float) -> tuple[Floats, Floats]:
             rotor = model.rotor.at(self._tabulated(at))  # whose sag is not asked for
-            damping, stiffness = self._system(replace(model, rotor=rotor), at, acceleration, 0.0)
+            damping, stiffness = self._system(replace(model, rotor=rotor), at, acceleration, slope)
             return stiffness, damping
 
-        fastest = self._fastest
-        model = fastest.model
         seen = self.linear(speed, is_whole=True).seen
-        rotor = rotor_of(self._fastest, matrices, self.phasor, seen)
-        widest = self._widest(speed, acceleration)
         return followed_reach(
-            rotor,
+            rotor_of(fastest, matrices, self.phasor, seen),
             speed,
             acceleration,
             self._momentum,
-            widest,
-            accuracy=self._fastest.accuracy,
-            others=self.accelerations or (acceleration, acceleration),
+            self._widest(speed, acceleration),
+            sense=0.0 if is_free else float(np.sign(acceleration)),
+            accuracy=(DRIVEN_SHARE if is_free else 1.0) * fastest.accuracy,
             guess=guess,
         )
 
     def _widest(self, speed: float, acceleration: float) -> float:
-        """Half of the widest range from a speed on, rad/s, no farther than the law goes."""
+        """Half of the widest range from a speed on, rad/s, no farther than a law goes."""
         fastest = self._fastest
         widest = (WIDEST_TABULATED if fastest.model.rotor.tabulated_speeds else WIDEST) * speed
-        if acceleration > 0.0:
+        if acceleration > 0.0 and fastest.free_spin is None:
             return min(widest, max(0.5 * (fastest.spin - speed), NARROWEST * speed))
         return min(widest, LONGEST_FALL * speed)
-
-    def _held_reach(self, speed: float, acceleration: float, slope: float) -> tuple[float, float]:
-        """The same over which matrices may be held."""
-        fastest, free = self._fastest, self._fastest.free_spin
-        _, damping, stiffness = self._matrices(speed, acceleration, slope)
-        _, next_damping, next_stiffness = self._matrices(speed * (1.0 + SPEED_STEP), acceleration, slope)
-        step = SPEED_STEP * speed
-        drift = (next_stiffness - stiffness) / step, (next_damping - damping) / step
-        reach, swing = held_range(
-            stiffness,
-            damping,
-            drift,
-            speed,
-            acceleration,
-            accuracy=fastest.accuracy if free is None else DRIVEN_SHARE * fastest.accuracy,
-            momentum=self._momentum,
-            widest=WIDEST_TABULATED if fastest.model.rotor.tabulated_speeds else WIDEST,
-        )
-        if free is None:
-            reach = min(reach, self._widest(speed, acceleration))
-        return reach, swing
 
     def _matrices(self, speed: float, acceleration: float, slope: float) -> tuple[Model, Floats, Floats]:
         """The model at a speed, within the tables of its bearings, its damping and its stiffness.

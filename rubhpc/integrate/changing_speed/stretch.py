@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary
+from rubhpc.integrate.changing_speed.range_library import RangeLibrary
 from rubhpc.integrate.marches.modal import Place
 from rubhpc.integrate.measuring.samples import stacked_accumulators
 from rubhpc.kernels.accumulators import Accumulator, Samples
@@ -42,7 +42,7 @@ def begin_stretch(
     begun: Place,
     since: float,
     left: tuple[int, Floats] | None = None,
-) -> RetunedLibrary | None:
+) -> RangeLibrary | None:
     """Begin a piece, to be continued in the same kernel call; None where it must be integrated alone.
 
     It has begun either way, but where the march is none that takes several (`has_piece_loop`). `left` is
@@ -50,7 +50,7 @@ def begin_stretch(
     the time from its middle to that of this one, s.
     """
     library = march.begin_tuned(setup, begun)
-    if not isinstance(library, RetunedLibrary):
+    if not isinstance(library, RangeLibrary):
         return None
     if left is not None and library.follows(march.mask):
         march.keep_fast(left, setup.spin, since)
@@ -59,7 +59,7 @@ def begin_stretch(
 
 def take_stretch(
     march: EventDrivenMarch,
-    library: RetunedLibrary,
+    library: RangeLibrary,
     block: Block,
     first: int,
     samples: Samples,
@@ -94,7 +94,7 @@ def take_stretch(
         search_level=block.search_level[:n_piece],
         force=block.force[:n_piece],
         since=np.array([earlier[1] if i == first else lasts[i - 1] for i in range(n_piece)]),
-        table=library.tuned(march.met),
+        table=library.filled(march.met),
         n_room=library.n_room,
         n_sample=n_sample,
         n_part_sample=part,
@@ -124,7 +124,7 @@ def take_stretch(
             if library.has_strange(march.met):  # from here on piece by piece
                 march.step_back(pieces)
                 break
-            pieces = pieces._replace(table=library.tuned(march.met))
+            pieces = pieces._replace(table=library.filled(march.met))
     end = int(pieces.at[PIECE])
     assert end == n_piece or outcome != FINISHED
     has_lost = any(

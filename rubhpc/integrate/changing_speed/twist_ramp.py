@@ -28,6 +28,13 @@ class TwistRamp(NamedTuple):
     rate: Floats  # (n_rotor_dof,), m/s and rad/s
     constant: Floats | None = None  # (n_probe,), the half as probes see it; None: by rows that do not change
 
+    def with_sag(self, other: TwistRamp, setup: PieceSetup) -> TwistRamp:
+        """The sum of it and of a change by bearings."""
+        constant = None
+        if other.constant is not None:
+            constant = other.constant + setup.model.probe_rows[0][:, : self.half.size] @ self.half
+        return TwistRamp(self.half + other.half, self.rate + other.rate, constant)
+
     @property
     def moves(self) -> bool:
         """Whether the sag moves at all."""

@@ -14,7 +14,7 @@ from rubhpc.integrate.reduced_model.contact_mode import (
     confined_modes,
     steady_response,
 )
-from rubhpc.integrate.reduced_model.penalty_mode import damped, stored_energy
+from rubhpc.integrate.reduced_model.penalty_mode import damped
 from rubhpc.integrate.reduced_model.products import expanded, real_times
 from rubhpc.integrate.reduced_model.secular_modes import Contact
 from rubhpc.kernels.friction_states import BACKWARD, OPEN, STUCK, lifted_place
@@ -106,10 +106,6 @@ class FrictionPairs:
     def damped(self, reduced: ReducedModel, mask: int) -> ReducedModel:
         """The model with the penalty's dampers of the closed pairs."""
         return damped(reduced, self.damping, self.gap_jacobian[self.closed(mask)])
-
-    def stored_energy(self, mode: ContactMode, width: int) -> Floats:
-        """Energy of the penalty's springs, J, as a form of the coordinates of a mode: (2 width, 2 width)."""
-        return stored_energy(self.stiffness, self.gap_jacobian, self.closed(mode.mask), mode, width)
 
 
 def states_of(mask: int, q: int) -> list[int]:

@@ -11,6 +11,7 @@ import numpy as np
 from rubhpc.integrate.reduced_model.contact_mode import ContactMode, count_coordinates
 from rubhpc.integrate.reduced_model.energy_forms import energies_of
 from rubhpc.integrate.reduced_model.mode_tables import Spared, bytes_ahead, mode_of, tabulate
+from rubhpc.integrate.reduced_model.penalty_mode import stored_energy
 from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions
 from rubhpc.integrate.reduced_model.table_stack import MOST_BYTES, MOST_MODES, TableStack
 from rubhpc.integrate.reduced_model.touching import contact_mode_among, open_bodies
@@ -238,8 +239,10 @@ class ModeLibrary:
         return padded_width(max(sizes), len(self.gap_jacobian))
 
     def _solved(self, mask: int) -> ContactMode:
-        if mask == 0:
-            return self._opened
+        return self._opened if mask == 0 else self._solve(mask)
+
+    def _solve(self, mask: int) -> ContactMode:
+        """The mode of a set of states."""
         directions = self.gap_jacobian, self.force_direction
         return contact_mode_among(self._among, self.reduced, directions, mask, self._known)
 
@@ -247,12 +250,31 @@ class ModeLibrary:
         """Closed pairs of a set."""
         return [i for i in range(len(self.gap_jacobian)) if mask >> i & 1]
 
-    def _energies_of(self, mode: ContactMode, reduced: ReducedModel) -> Energies:
+    def _damped(self, mask: int) -> ReducedModel:
+        """The bodies with the dampers that a law adds in a set of states."""
+        return self.reduced
+
+    def _springs(self, mask: int) -> tuple[float, list[int]]:
+        """Stiffness of the springs of a law, N/m, and pairs that press them."""
+        return 0.0, []
+
+    def _energies_of(self, mode: ContactMode) -> Energies:
         """Energies of a mode."""
-        friction = self._friction_of(mode)
+        friction, reduced = self._friction_of(mode), self._damped(mode.mask)
         if self._among is None:
-            return energies_of(mode, reduced, friction, self.width)
-        return self._among.energies(mode, reduced, friction, self._closed_pairs(mode.mask), self.width)
+            found = energies_of(mode, reduced, friction, self.width)
+        else:
+            closed = self._closed_pairs(mode.mask)
+            found = self._among.energies(mode, reduced, friction, closed, self.width)
+        return self._with_springs(found, mode)
+
+    def _with_springs(self, energies: Energies, mode: ContactMode) -> Energies:
+        """Energies of a mode with those of the springs of a law."""
+        stiffness, pressed = self._springs(mode.mask)
+        if not pressed:
+            return energies
+        stored = stored_energy(stiffness, self.gap_jacobian, pressed, mode, self.width)
+        return energies._replace(loss=energies.loss + stored)
 
     def _slip_rows(self) -> Floats:
         """Slip speed of each pair with the motion, unless the switch functions contain it."""
@@ -280,7 +302,7 @@ class ModeLibrary:
             mode,
             reduced,
             self._slip_rows(),
-            energies=self._energies_of(mode, reduced) if self._is_measured else None,
+            energies=self._energies_of(mode) if self._is_measured else None,
             width=self.width,
             tick=self._tick,
             sample_level=self._sample_level,

@@ -12,23 +12,26 @@ if TYPE_CHECKING:
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode
     from rubhpc.integrate.reduced_model.penalty_mode import Penalty
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
-    from rubhpc.kernels.contact_modes import ModeTables
 
 
 class PressedPairs(ModeLibrary):
-    """Part of a penalty in tables of contact modes: loss of dampers and energy of springs."""
+    """Modes of pairs that are pressed, by spring and damper, or lifted; with their losses and energies."""
 
     _penalty: Penalty
 
     def _closed_pairs(self, mask: int) -> list[int]:
         return self._penalty.pressed(mask)
 
-    def _tables_of(self, mode: ContactMode, reduced: ReducedModel) -> ModeTables:
-        if not self._is_measured:
-            return super()._tables_of(mode, reduced)
-        tables = super()._tables_of(mode, self._penalty.damped(reduced, mode.mask))
-        tables.loss[0] += self._penalty.stored_energy(mode, self.width)
-        return tables
+    def _solve(self, mask: int) -> ContactMode:
+        if mask == 0:
+            return super()._solve(0)
+        return penalty_mode_among(self._among, self.reduced, self._penalty, self._opened, mask, self._known)
+
+    def _damped(self, mask: int) -> ReducedModel:
+        return self._penalty.damped(self.reduced, mask)
+
+    def _springs(self, mask: int) -> tuple[float, list[int]]:
+        return self._penalty.stiffness, self._penalty.pressed(mask)
 
 
 class PenaltyLibrary(PressedPairs):
@@ -49,6 +52,3 @@ class PenaltyLibrary(PressedPairs):
         """Start as `ModeLibrary` does."""
         self._penalty = penalty
         super().__init__(reduced, model, friction, **shared)
-
-    def _solved(self, mask: int) -> ContactMode:
-        return penalty_mode_among(self._among, self.reduced, self._penalty, self._opened, mask, self._known)

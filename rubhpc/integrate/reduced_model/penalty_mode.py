@@ -41,10 +41,6 @@ class Penalty(NamedTuple):
         """The model with the dampers of the pressed pairs, without the friction by their forces."""
         return damped(reduced, self.damping, self.gap_jacobian[self.pressed(mask)])
 
-    def stored_energy(self, mode: ContactMode, width: int) -> Floats:
-        """Energy of the pressed springs, J, as a form of the coordinates of a mode: (2 width, 2 width)."""
-        return stored_energy(self.stiffness, self.gap_jacobian, self.pressed(mode.mask), mode, width)
-
 
 def solve_penalty_mode(
     reduced: ReducedModel,

@@ -1,4 +1,4 @@
-"""What a change of the matrices does to a motion amid contacts of equal stators."""
+"""What a change of range does to a motion amid contacts of equal stators."""
 
 import math
 from dataclasses import replace
@@ -7,26 +7,31 @@ import numpy as np
 from trial_rig import trial_rig
 
 from rubhpc import run_up
+from rubhpc.integrate.changing_speed import speed_ranges
 from rubhpc.integrate.changing_speed.passing import Passing
 
 DRIVE = {"torque": 0.3, "inertia": 2e-3, "lowest": 20.0, "start": 250.0, "revolutions": 8}
 
 
 def whip_of(monkeypatch, count, **changed):
-    """A drive in a ring, and how much of its velocity each change of matrices takes, by pairs closed."""
+    """A drive in a ring, and how much of its velocity each change of range takes, by pairs closed."""
     rig = trial_rig(1, **changed)
     ring = tuple(replace(rig.stator[0], angle=0.3 + 2.0 * math.pi * i / count) for i in range(count))
-    changes, go_on = [], Passing.continued
+    changes, goes_over = [], Passing.goes_over
 
-    def watched(passing, setup, begun, before, lasted):
-        after = go_on(passing, setup, begun, before, lasted)
-        if before is not None and before.setup.held is not setup.held:
-            n = begun.motion.size // 2
-            moved = np.linalg.norm(after.motion[n:] - begun.motion[n:]) / np.linalg.norm(begun.motion[n:])
+    def watched(passing, setup, begun, before, jump=0.0):
+        found, moved = goes_over(passing, setup, begun, before, jump), 0.0
+        if found:
+            march, n = passing._march, begun.motion.size // 2
+            first = march.motion()[n:].copy()
+            march.keep_fast(passing.left, setup.spin, before.time)
+            moved = np.linalg.norm(march.motion()[n:] - first) / np.linalg.norm(first)
+        if before is not None:
             changes.append((np.count_nonzero(begun.contact_force), moved))
-        return after
+        return found
 
-    monkeypatch.setattr(Passing, "continued", watched)
+    monkeypatch.setattr(Passing, "goes_over", watched)
+    monkeypatch.setattr(speed_ranges, "WIDEST", 0.005)  # narrow ranges
     found = run_up(
         replace(rig, stator=ring),
         drive=DRIVE,

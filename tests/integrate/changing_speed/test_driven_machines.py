@@ -110,7 +110,7 @@ def test_a_machine_meets_full_order_stepping(n, keys):
         samples_per_revolution=PER_REVOLUTION,
         pieces_per_revolution=4,
         initial={"from": "rest"},
-        accuracy=1e-4 if "table" in keys else 1e-3,  # with which bearings are held
+        accuracy=1e-3,
         **CONTACT,
     )
     allowed = 1e-3

@@ -4,27 +4,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_retuned_modes import LAWS, setup
+from test_filled_modes import LAWS, setup
 
-from rubhpc.integrate.changing_speed.followed_modes import NODES, matched
+from rubhpc.integrate.changing_speed.mode_courses import NODES
 from rubhpc.integrate.changing_speed.mode_parts import speeds_of
-from rubhpc.integrate.changing_speed.near_modes import near_mode
 from rubhpc.kernels.contact_modes import enter, enter_rest
 
 REACH = 20.0  # rad/s
 
 
-def matrices_of(base, size, push=0.0):
-    """The reduced model at places in the range and of the acceleration.
-
-    Gyroscopic terms grow by those of a speed, `size` (rad/s), and by those of an acceleration, `push`.
-    """
+def matrices_of(base, size):
+    """The reduced model at places in the range, whose gyroscopic terms grow by those of a speed, rad/s."""
     reduced, rotor = base.reduced, base.model.rotor
     shape = reduced.basis[: rotor.n_dof]
     turning = shape.T @ rotor.gyroscopic @ shape
 
-    def at(place, rise=0.0):
-        bearing = reduced.stiffness * (1.0 - 1e-4 * size * place) + rise * push * turning
+    def at(place):
+        bearing = reduced.stiffness * (1.0 - 1e-4 * size * place)
         return replace(reduced, stiffness=bearing, damping=reduced.damping + place * size * turning)
 
     return at
@@ -67,7 +63,7 @@ def assert_primitives(tables, row):
     assert whole[:, :m] * rate[:, :m] == pytest.approx(switch[:, :m] ** 2, rel=1e-9)
 
 
-def library_of(base, law, at, *, is_risen=False):
+def library_of(base, law, at):
     phasor = (base.reduced.force[0] - 1j * base.reduced.force[1]) / base.spin**2
     return law.kind(
         at(0.0),
@@ -78,22 +74,22 @@ def library_of(base, law, at, *, is_risen=False):
         tick=base.tick,
         sample_level=base.sample_level,
         n_level=base._n_level,
+        reach=REACH,
         **law.keys(base),
         beside=[at(place) for place in NODES[1:]],
         at_place=at,
-        risen=at(0.0, 1.0) if is_risen else None,
         is_balanced=False,
     )
 
 
-def error_at(base, law, at, masks, place, rise=0.0, *, is_risen=False):
+def error_at(base, law, at, masks, place):
     """What modes err by that follow the speed and the acceleration to a place, over the greatest."""
-    library, spin = library_of(base, law, at, is_risen=is_risen), base.spin + place * REACH
+    library, spin = library_of(base, law, at), base.spin + place * REACH
     phasor, factor = library._phasor, complex(spin**2)
-    held = base.spin, base.sample_level, REACH, rise
+    held = base.spin, base.sample_level, REACH
     library.tune(speeds_of([spin], [factor], [0.0], [base.tick], *held), 0)
     force = np.stack([(phasor * factor).real, -(phasor * factor).imag])
-    reduced = replace(at(place, rise), spin=spin, force=force)
+    reduced = replace(at(place), spin=spin, force=force)
     levels = {"sample_level": base.sample_level, "n_level": base._n_level, "tick": base.tick}
     worst = 0.0
     for mask in masks:
@@ -140,39 +136,3 @@ def test_what_entering_a_mode_leaves_of_a_motion_is_entered_too(law):
         enter_rest(*rows, motion.copy(), z)
         assert np.abs((motion - rows[0] @ z[0] + rows[1] @ z[1]) / size).max() < 1e-11
     assert lost > 1e-8
-
-
-@pytest.mark.parametrize("q", [1, 3])
-@pytest.mark.parametrize("law", LAWS, ids=lambda law: type(law).__name__)
-def test_modes_follow_the_acceleration_in_second_order(q, law):
-    """They are exact at both accelerations that they go through."""
-    base, masks = setup(q), law.masks[q]
-    errors = []
-    for push in (4000.0, 2000.0):
-        at = matrices_of(base, 5.0, push)
-        assert error_at(base, law, at, masks, 0.0, 1.0, is_risen=True) < 1e-7
-        errors.append(error_at(base, law, at, masks, 0.0, -1.0, is_risen=True))
-    assert errors[0] < 1e-3, errors
-    assert 3.0 < errors[0] / errors[1] < 5.0, errors
-
-
-@pytest.mark.parametrize("q", [1, 3])
-@pytest.mark.parametrize("law", LAWS, ids=lambda law: type(law).__name__)
-def test_modes_near_a_known_one_are_those_solved(q, law):
-    base = setup(q)
-    at = matrices_of(base, 30.0, 4000.0)
-    library, n_near = library_of(base, law, at), 0
-    other = library._with(at(0.9, 1.0))
-    for mask in law.masks[q]:
-        mode = library._solved(mask)
-        linear = library._linear(mode), other._linear(mode)
-        near, solved = near_mode(mode, linear, library.reduced, other.reduced), other._solved(mask)
-        if near is None:
-            continue
-        n_near, true, m = n_near + 1, matched(mode, solved), mode.n_eigenmode
-        response = np.arange(mode.exponent.size) == m
-        for name in ("exponent", "motion", "switch"):
-            own, expected = getattr(near, name)[..., ~response], getattr(true, name)[..., ~response]
-            assert np.abs(own - expected).max() <= 1e-8 * np.abs(expected).max(), (mask, name)
-        assert not near.exponent[mode.exponent.imag == 0.0].imag.any()  # by that kernels know decays
-    assert n_near > 0

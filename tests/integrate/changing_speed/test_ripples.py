@@ -9,7 +9,6 @@ from test_steep_run_ups import PROBES, machine
 
 from rubhpc import run_up
 from rubhpc.integrate.changing_speed import ripples
-from rubhpc.integrate.changing_speed.carried_modes import left_over
 from rubhpc.integrate.changing_speed.case import record_run_up
 from rubhpc.integrate.changing_speed.ripples import Linear, Ripples
 from rubhpc.integrate.setup import prepare
@@ -91,17 +90,3 @@ def test_a_case_of_a_study_says_so(monkeypatch):
     case = {"clearance": 1.0, "friction": 0.0, "initial": Initial(from_=CONTACT_FREE)}
     monkeypatch.setattr(ripples, "PROMISED", 1e-3)
     assert "take more samples_per_revolution" in record_run_up(setup, law, recording=recording, **case).remark
-
-
-def test_a_change_that_is_spread():
-    """Of what is slow the mean is left, of what is fast its square; what dies leaves none."""
-    turning = np.array([0.0, 1j, 40j, 200j, -1000.0])
-    before, after = 0.02, 0.03
-    found = left_over(turning, before, after, has_touched=False)
-    time = np.linspace(-before, after, 100_001)
-    mean = np.exp(turning[:, np.newaxis] * time).mean(axis=1)
-    assert found[:3] == pytest.approx(mean[:3], abs=2e-4)
-    assert abs(found[3]) == pytest.approx(abs(mean[3]) ** 2, abs=2e-4)
-    assert abs(found[4]) < 1e-6
-    touched = left_over(turning, before, after, has_touched=True)
-    assert np.abs(touched[:4]) == pytest.approx(np.abs(mean[:4]) ** 3, abs=2e-4)

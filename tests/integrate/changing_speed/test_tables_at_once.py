@@ -8,7 +8,7 @@ from overhung_pump import pump
 from test_run_up_machines import PROBES, TIPS
 
 from rubhpc import run_up
-from rubhpc.integrate.changing_speed import pieces, retuned_modes, speed_ranges
+from rubhpc.integrate.changing_speed import pieces, range_library, speed_ranges
 
 CASE = {"start": 320.0, "stop": 332.0, "time": 0.18, "clearance": 1.2e-4, "friction": 0.1}
 SIGNALS = "vertical", "torsion", "probe_twist", "probe_impeller"
@@ -18,17 +18,17 @@ SIGNALS = "vertical", "torsion", "probe_twist", "probe_impeller"
 @pytest.mark.parametrize("law", [{}, {"friction_law": "coulomb"}], ids=["sliding", "coulomb"])
 def test_fewer_pieces_at_once_give_the_same_run_up(law, per_revolution, monkeypatch):
     rig, found, rooms = replace(pump(), stator=TIPS), [], []
-    room_of = retuned_modes.RetunedLibrary._n_room_of
+    room_of = range_library.RangeLibrary._n_room_of
 
     def noted(library, n_byte):
         rooms.append(room_of(library, n_byte))
         return rooms[-1]
 
-    monkeypatch.setattr(retuned_modes.RetunedLibrary, "_n_room_of", noted)
-    for most in (retuned_modes.MOST_BYTES, retuned_modes.MOST_BYTES // 4, 1):
-        monkeypatch.setattr(retuned_modes, "MOST_BYTES", most)
+    monkeypatch.setattr(range_library.RangeLibrary, "_n_room_of", noted)
+    for most in (range_library.MOST_BYTES, range_library.MOST_BYTES // 4, 1):
+        monkeypatch.setattr(range_library, "MOST_BYTES", most)
         pieces._KNOWN.clear()  # matrices with tables for as many pieces as before
-        speed_ranges._DESKS.clear()
+        speed_ranges._BUFFERS.clear()
         case = CASE | law | {"pieces_per_revolution": per_revolution}
         found.append(run_up(rig, **case, probes=PROBES, samples_per_revolution=64))
     assert found[0].contact_fraction.max() > 0.0

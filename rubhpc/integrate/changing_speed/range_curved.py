@@ -1,12 +1,10 @@
-"""Contact modes with curved gaps, tuned to the speed of each piece of a run-up."""
+"""Contact modes with curved gaps over a range of speeds."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from rubhpc.integrate.changing_speed.retuned_modes import RetunedLibrary
+from rubhpc.integrate.changing_speed.range_library import RangeLibrary
 from rubhpc.integrate.reduced_model.curved_bodies import motion_rows
 from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
 from rubhpc.integrate.reduced_model.curved_tables import (
@@ -22,14 +20,13 @@ from rubhpc.integrate.reduced_model.table_stack import TableStack
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rubhpc.integrate.changing_speed.near_modes import Linear
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
     from rubhpc.kernels.contact_modes import ModeTables
 
 
-class RetunedCurvedLibrary(RetunedLibrary, CurvedLibrary):
-    """Contact modes of one set of matrices, with what curved gaps need of them.
+class RangeCurvedLibrary(RangeLibrary, CurvedLibrary):
+    """Contact modes of one range of speeds, with what curved gaps need of them.
 
     `at_piece` gives the reduced model at the speed of the piece at hand.
     """
@@ -40,15 +37,15 @@ class RetunedCurvedLibrary(RetunedLibrary, CurvedLibrary):
         self._at_piece = at_piece
         self._still: dict[int, StillParts] = {}  # by set of closed pairs
         self._n_curved, self._n_step = 0, n_tabulated(keys["tick"], keys["n_level"])
-        # Its own desk: tables of curved gaps stay where they are. They are larger, and made piece by piece.
-        super().__init__(*args, **keys | {"desks": None, "at_once": 1})
+        # Its own buffer: tables of curved gaps stay where they are. They are larger, and made piece by piece.
+        super().__init__(*args, **keys | {"buffers": None, "at_once": 1})
 
     def add(self, mask: int) -> bool:
-        """Tune the mode with these pairs closed; returns whether the tables are wide enough for it."""
-        is_tuned = self._tuned.get(mask, 0) > self._at
+        """Fill tables of the mode with these pairs closed; returns whether they are wide enough for it."""
+        is_filled = self._filled.get(mask, 0) > self._at
         if not super().add(mask):
             return False
-        if not is_tuned:
+        if not is_filled:
             self._tune_curved(mask)
         return True
 
@@ -65,10 +62,6 @@ class RetunedCurvedLibrary(RetunedLibrary, CurvedLibrary):
         self._still[mode.mask] = still_parts(mode, self.reduced, self._row, directions)
         super()._tabulate(mode, row)
 
-    def _linear(self, mode: ContactMode) -> Linear:
-        linear = super()._linear(mode)  # friction follows the momentary normal, and is not counted
-        return linear._replace(across=np.zeros_like(linear.across))
-
     def _tune_curved(self, mask: int) -> None:
         place, tables = self._place[mask], self.tables()
         reduced, still = self._at_piece(), self._still[mask]
@@ -79,7 +72,7 @@ class RetunedCurvedLibrary(RetunedLibrary, CurvedLibrary):
             self._curved.add(empty_tables(still, self.width, self._n_step))
             self._n_curved += 1
         curved = self.curved_tables()
-        if is_new or (self._beside and still.closed):
+        if is_new or (self._is_followed and still.closed):
             push(curved, place, still, reduced, (tables.enter_re[place] + 1j * tables.enter_im[place]).T)
         motion = tables.motion_re[place], tables.motion_im[place]
         longest = float(self._speeds.tick[self._at]) * 2.0 ** (self._n_step - 1)

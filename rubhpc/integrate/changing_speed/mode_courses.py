@@ -1,0 +1,326 @@
+"""Contact modes over a range of speeds: polynomials through those of three speeds.
+
+Eigenvectors of the speeds at either side are brought to the length and phase that those in the middle see as
+theirs, so that exponents, shapes, their inverse and what is made of them go smoothly: parabolas follow them,
+with errors of the third order in the range. The inverse has to be their inverse, or each event would lose or
+gain motion: it is exact at seven places, and goes through these by polynomials of the sixth order.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.integrate.reduced_model.energy_forms import growth_of
+from rubhpc.kernels.courses import Course, Courses
+from rubhpc.kernels.filling import ModeCourse
+from rubhpc.kernels.filling_energies import Losses
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rubhpc.integrate.reduced_model.contact_mode import ContactMode
+    from rubhpc.kernels.contact_modes import ModeTables
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+Ints = NDArray[np.int64]
+A = TypeVar("A", Floats, Complexes)
+
+# Places of the three speeds in the range, and of those where the inverse is exact, the middle first: these
+# are zeros of Chebyshev's polynomial.
+NODES = 0.0, -0.8, 0.8
+EXACT = 0.0, *(sign * math.cos(k * math.pi / 14.0) for k in (5, 3, 1) for sign in (-1.0, 1.0))
+POWERS = {len(places): np.linalg.inv(np.vander(places, increasing=True)) for places in (NODES, EXACT)}
+JUDGED = -1.0, -0.62, 0.62, 1.0  # places between those, at which the inverse is judged
+MOST_LOST = 1e-4  # share of a mode in another, beyond which modes go with the speed too fast
+_BY_COORDINATES = "exponent", "row", "resisting_re", "resisting_im"  # that have a response
+FAR = 0.5  # share of a mode in another of a speed beside it, over its own, from which it is not the same
+EQUAL = 1e-9  # relative difference of two exponents that repeat
+STILL, LEAST = 1e-13, 1e-16  # change of an entry over it, and over the greatest, below which it stays
+NONE = Course(np.zeros(0, dtype=np.int64), np.zeros((1, 0)))
+NOTHING = Courses(np.zeros(0), *[NONE] * (len(Courses._fields) - 1))
+
+
+class Node(NamedTuple):
+    """A contact mode of one speed with its tables; coordinates are padded to their width."""
+
+    mode: ContactMode
+    row: ModeTables  # (1, ...) each
+    exponent: Complexes  # (width,), 1/s
+    output: Floats  # (o, 3 n), what output rows see of displacements, rates and accelerations
+    seen: Complexes  # (o, width), what they see of coordinates
+    resisting: Complexes  # (n, width), resisting forces; (0, width) where no energies are asked for
+
+    @classmethod
+    def of(cls, mode: ContactMode, row: ModeTables, output: Floats, resisting: Complexes) -> Node:
+        """That of a mode and its tables; `resisting` may have fewer coordinates."""
+        motion = row.motion_re[0] + 1j * row.motion_im[0]
+        n, end, width = len(motion) // 2, mode.exponent.size, motion.shape[1]
+        exponent = np.pad(mode.exponent, (0, width - end))
+        position, velocity, acceleration = np.hsplit(output, 3)
+        seen = position @ motion[:n] + velocity @ motion[n:] + (acceleration @ motion[n:]) * exponent
+        return cls(mode, row, exponent, output, seen, np.pad(resisting, ((0, 0), (0, width - end))))
+
+
+def between(values: Sequence[A], place: float) -> A:
+    """What goes through values at `NODES` or `EXACT`, the middle first, at a place in the range."""
+    middle, *others = values
+    shares = shares_of(place, len(values))
+    found: A = middle + sum(share * (other - middle) for share, other in zip(shares, others, strict=True))
+    return found
+
+
+def matched(mode: ContactMode, other: ContactMode) -> ContactMode | None:
+    """Another speed's mode in the order, lengths and phases of `mode`; None where it is another motion."""
+    m = mode.n_eigenmode
+    if other.n_eigenmode != m or other.exponent.size != mode.exponent.size:
+        return None
+    enter, motion = mode.enter[:m], other.motion[:, :m]
+    weight = weights(mode)
+    seen = enter @ motion / weight[:, np.newaxis]
+    if (found := aligned(seen, mode.exponent[:m])) is None:
+        return None
+    place, turn = found
+    if np.any(weights(other)[place] != weight):
+        return None
+    is_same = (motion[:, place] == mode.motion[:, :m]).all(axis=0)
+    turn[:, is_same] = np.eye(m)[:, is_same]
+    back = np.linalg.inv(turn)
+    shapes, entered, switch = other.motion.copy(), other.enter.copy(), other.switch.copy()
+    exponent, take_off = other.exponent.copy(), other.take_off.copy()
+    shapes[:, :m] = other.motion[:, place] @ back
+    switch[:, :m] = other.switch[:, place] @ back
+    entered[:m] = turn @ other.enter[place]
+    take_off[:, :m] = other.take_off[:, place] @ turn.T
+    exponent[:m] = other.exponent[place]
+    return replace(other, exponent=exponent, motion=shapes, enter=entered, take_off=take_off, switch=switch)
+
+
+def aligned(seen: Complexes, exponent: Complexes) -> tuple[NDArray[np.int64], Complexes] | None:
+    """Which modes (m,) of another speed are those seen here, and what they are of these, (m, m).
+
+    None where they are others.
+
+    Parameters
+    ----------
+    seen : (m, m)
+        Modes of the other speed in coordinates of those here, by columns.
+    exponent : (m,), 1/s
+        Of those here; modes whose exponents repeat are taken together.
+    """
+    groups, m = _groups(exponent), exponent.size
+    first = np.array([group[0] for group in groups])
+    squares = np.abs(seen) ** 2
+    repeated = [group for group in groups if group.size > 1]
+    for group in repeated:
+        squares[group[0]] = squares[group].sum(axis=0)
+    of_group = squares[first].argmax(axis=0)
+    if np.any(np.bincount(of_group, minlength=len(groups)) != [group.size for group in groups]):
+        return None
+    place = np.empty(m, dtype=np.int64)
+    place[np.concatenate(groups)] = np.argsort(of_group, kind="stable")
+    seen = seen[:, place]
+    turn = np.diag(np.diag(seen))
+    for group in repeated:
+        turn[np.ix_(group, group)] = seen[np.ix_(group, group)]
+    own = np.linalg.norm(turn, axis=0)
+    if np.any(np.abs(seen - turn).max(axis=0, initial=0.0) > FAR * own):
+        return None
+    return place, turn
+
+
+def weights(mode: ContactMode) -> Floats:
+    """2 for modes that stand for a conjugate pair, 1 for others."""
+    m = mode.n_eigenmode
+    own = np.einsum("ka,ak->k", mode.enter[:m], mode.motion[:, :m]).real
+    return np.where(own > 1.5, 2.0, 1.0)
+
+
+def constant_course(
+    node: Node,
+    phasor: Complexes,
+    *,
+    n_ahead: int,
+    spring: float = 0.0,
+    gap: Floats,
+    clearance: Sequence[int] = (),
+) -> ModeCourse:
+    """A mode whose eigenmodes stay what they are.
+
+    What drives them follows from the response to the unbalance at the speed for which the mode is solved.
+
+    Parameters
+    ----------
+    phasor : (n,), kg m
+        Unbalance at unit speed.
+    n_ahead : int
+        Samples that are read from one set of coordinates.
+    spring : float, N/m
+        Stiffness of pressed springs, with `gap` (k, n) by reduced displacements and pairs `clearance`.
+    """
+    mode, m = node.mode, node.mode.n_eigenmode
+    exponent, turning, is_pair = mode.exponent[:m], mode.exponent[m], weights(mode) > 1.5
+    direct, other = mode.take_off[0, :m] - 1j * mode.take_off[1, :m], mode.take_off[0] + 1j * mode.take_off[1]
+    mirrored, force = other[:m].conj(), abs(turning) ** 2
+    growing, switch = growth_of(mode), mode.switch
+    rubbed = node.resisting[:, m] - _response(node.resisting[:, :m], direct, mirrored, is_pair)
+    return ModeCourse(
+        n_coordinate=mode.exponent.size,
+        n_ahead=n_ahead,
+        exponent=node.exponent.copy(),
+        is_pair=is_pair,
+        drive=direct * (turning - exponent) / force,
+        mirrored_drive=mirrored * (turning - exponent.conj()) / force,
+        reaction=(_response(switch[:, :m], direct, mirrored, is_pair) - switch[:, m]) / force,
+        phasor=phasor,
+        output=node.output,
+        row=node.seen,
+        losses=Losses(
+            resisting_re=node.resisting.real.copy(),
+            resisting_im=node.resisting.imag.copy(),
+            rubbed=rubbed / force,
+            half=0.5 * spring,
+            gap=np.ascontiguousarray(gap),
+            clearance=m + 1 + np.array(clearance, dtype=np.int64),
+            one=growing.steady,
+            growing=growing.which,
+            speed=growing.speed,
+        ),
+        courses=NOTHING,
+    )
+
+
+def followed(course: ModeCourse, nodes: Sequence[Node], entered: Entries) -> ModeCourse:
+    """The same mode with what of it goes with the speed.
+
+    `nodes` are those at `NODES`, the middle first; `entered` is what enters them (`entries`).
+    """
+    middle, mode = nodes[0], nodes[0].mode
+    m, n, width = mode.n_eigenmode, len(mode.motion) // 2, middle.exponent.size
+    courses = {}
+    for name, n_kept in (("motion", 1), ("switch", 1), ("slip", 1), ("rate", m + 1)):
+        for part in ("_re", "_im"):
+            values: Any = np.array([getattr(node.row, name + part)[0] for node in nodes])
+            courses[name + part] = _through(values, range(m + 1 - n_kept, m + 1))
+    enter, take_off = entered.enter, entered.take_off
+    padded: Complexes = np.zeros((len(enter), *middle.row.motion_re[0].shape), dtype=np.complex128)
+    padded[:, :, :m] = enter.transpose(0, 2, 1)
+    constant = np.zeros((len(enter), take_off.shape[1], 2, width))
+    constant[..., 0, :m], constant[..., 1, :m] = take_off.real, take_off.imag
+    of_entry = {"enter_re": padded.real, "enter_im": padded.imag, "enter_constant": constant}
+    courses |= {name: _through(values) for name, values in of_entry.items()}
+    loss = np.array([node.row.loss[0] for node in nodes])
+    both = [m, width + m][: len(loss[0])]
+    loss[1:, both] = loss[0][both]
+    courses["loss"] = _through(loss, both)
+    impulse = _response(mode.motion[n:, :m], course.drive, course.mirrored_drive, course.is_pair)
+    shape: dict[str, Any] = {
+        "exponent": [node.exponent for node in nodes],
+        "output": [node.output for node in nodes],
+        "row": [node.seen for node in nodes],
+    }
+    if middle.resisting.size:
+        shape["resisting_re"] = [node.resisting.real for node in nodes]
+        shape["resisting_im"] = [node.resisting.imag for node in nodes]
+        shape["speed"] = [growth_of(node.mode).speed for node in nodes]
+    entry = {"drive": enter[:, :, n:] @ impulse, "mirrored_drive": enter[:, :, n:].conj() @ impulse}
+    kept, views, places = _room({name: values[0] for name, values in (shape | entry).items()})
+
+    def moved(arrays: dict[str, Any]) -> Course:
+        found = []
+        for name, values in arrays.items():
+            of_course = _through(values, [m] if name in _BY_COORDINATES else [])
+            found.append(of_course._replace(at=of_course.at + places[name]))
+        return _joined(found)
+
+    of_losses = {name: views.pop(name) for name in Losses._fields if name in views}
+
+    return course._replace(
+        **views,
+        losses=course.losses._replace(**of_losses),
+        courses=Courses(kept=kept, kept_shape=moved(shape), kept_entry=moved(entry), **courses),
+    )
+
+
+def _response(
+    rows: Complexes, direct: Complexes, mirrored: Complexes, is_pair: NDArray[np.bool_]
+) -> Complexes:
+    """What rows (r, m) see of a response with these shares (m,) of eigenmodes and of their conjugates."""
+    of_real = np.where(is_pair, 0.5 * (direct + mirrored), direct)
+    of_imaginary = np.where(is_pair, 0.5j * (direct - mirrored), 1j * direct)
+    found: Complexes = (rows.real @ of_real + rows.imag @ of_imaginary).astype(np.complex128)
+    return found
+
+
+def taken(course: Course, values: Floats, place: float) -> Floats:
+    """A copy of an array with what goes with the speed at a place in the range."""
+    found = values.copy()
+    found.reshape(-1)[course.at] = np.polynomial.polynomial.polyval(place, course.value)
+    return found
+
+
+def _groups(exponent: Complexes) -> list[NDArray[np.int64]]:
+    """Places of the exponents, those that repeat together."""
+    near = np.abs(exponent[:, np.newaxis] - exponent) <= EQUAL * np.abs(exponent)
+    if near.sum() == exponent.size:
+        return list(np.arange(exponent.size)[:, np.newaxis])
+    return [np.array(group) for group in sorted({tuple(np.flatnonzero(row)) for row in near})]
+
+
+class Entries(NamedTuple):
+    """What enters a mode of m eigenmodes that follows the speed, at `EXACT`."""
+
+    enter: Complexes  # (7, m, 2 n)
+    take_off: Complexes  # (7, c, m), of constants
+    lost: float  # share of a mode in another, at most, by which it is no inverse between these places
+
+
+def shares_of(place: float, count: int) -> Floats:
+    """What goes through values at `count` places has of each but the first, less that, at a place."""
+    powers: Floats = place ** np.arange(count, dtype=np.float64)
+    shares: Floats = (powers @ POWERS[count])[1:]
+    return shares
+
+
+def _through(values: Any, kept: Sequence[int] = ()) -> Course:
+    """What goes through arrays at `NODES` or `EXACT`.
+
+    Coordinates `kept`, of the last axis, stay as in the first array.
+    """
+    values = np.array(values)  # a copy
+    values[1:] -= values[0]
+    values[1:, ..., list(kept)] = 0.0
+    flat = values.view(np.float64).reshape(len(values), -1)
+    size = np.abs(flat[1:]).max(axis=0, initial=0.0)
+    at = np.flatnonzero(size > np.maximum(STILL * np.abs(flat[0]), LEAST * size.max(initial=0.0)))
+    moved = np.ascontiguousarray(flat[:, at])
+    factors = POWERS[len(values)][:, 1:] @ moved[1:]
+    factors[0] += moved[0]
+    return Course(at, factors)
+
+
+def _joined(courses: list[Course]) -> Course:
+    at = np.concatenate([course.at for course in courses])
+    return Course(at, np.concatenate([course.value for course in courses], axis=1))
+
+
+def _room(arrays: dict[str, Any]) -> tuple[Floats, dict[str, Any], dict[str, int]]:
+    """One memory for arrays, with their values: it, the arrays in it, and where each begins."""
+    ends = np.cumsum([0, *(value.size * (2 if np.iscomplexobj(value) else 1) for value in arrays.values())])
+    memory, views, places = np.zeros(int(ends[-1])), {}, {}
+    for (name, value), first, end in zip(arrays.items(), ends[:-1], ends[1:], strict=True):
+        view = memory[first:end].view(value.dtype).reshape(value.shape)
+        view[:] = value
+        views[name], places[name] = view, int(first)
+    return memory, views, places
+
+
+def most_of(values: Floats | Complexes) -> float:
+    """The largest real or imaginary part, without a root for each value."""
+    parts = values.view(np.float64)
+    return float(max(parts.max(initial=0.0), -parts.min(initial=0.0)))

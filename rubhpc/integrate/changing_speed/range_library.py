@@ -1,0 +1,384 @@
+"""Contact modes over a range of speeds, filled for the speeds of a run-up's pieces, several of them at once.
+
+They are solved when first met, at three speeds of the range (`mode_courses`). The unbalance response and the
+exponentials are made anew for each piece (`kernels.filling`).
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+
+from rubhpc.integrate.changing_speed.eigenmodes import Eigenmodes
+from rubhpc.integrate.changing_speed.mode_courses import (
+    MOST_LOST,
+    NODES,
+    Node,
+    constant_course,
+    followed,
+    matched,
+)
+from rubhpc.integrate.changing_speed.mode_entries import entries
+from rubhpc.integrate.changing_speed.mode_parts import (
+    output_operators,
+    speeds_of,
+    with_slip,
+    without_filled,
+)
+from rubhpc.integrate.reduced_model.energy_forms import energies_of
+from rubhpc.integrate.reduced_model.mode_library import ModeLibrary, width_without_modes
+from rubhpc.integrate.reduced_model.reduction import directions
+from rubhpc.integrate.reduced_model.table_stack import TableStack
+from rubhpc.integrate.reduced_model.touching import OpenBodies, open_bodies
+from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
+from rubhpc.kernels.filling import fill
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from rubhpc.fem.model import Model
+    from rubhpc.integrate.reduced_model.contact_mode import ContactMode
+    from rubhpc.integrate.reduced_model.energy_forms import Energies
+    from rubhpc.integrate.reduced_model.reduction import ReducedModel
+    from rubhpc.integrate.reduced_model.system_modes import Solved
+    from rubhpc.kernels.contact_modes import ModeTables
+    from rubhpc.kernels.filling import ModeCourse, Speeds
+
+    Floats = NDArray[np.float64]
+    Complexes = NDArray[np.complex128]
+    Ints = NDArray[np.int64]
+
+NOT_FILLED = -2  # in place of a set of closed pairs: a contact mode that this piece has not met
+STRUCK = 1e9  # rad/s, speed of the unbalance for which modes are solved
+AT_ONCE = 16  # pieces for whose speeds a contact mode is filled at once
+MOST_BYTES = 2**23  # of its tables for so many pieces; where they are more, it is filled for fewer at once
+
+
+class TableBuffer:
+    """Tables that are filled for pieces under way, of one library after the other."""
+
+    def __init__(self, tables: TableStack) -> None:
+        self.tables = tables
+        self.user: RangeLibrary | None = None
+
+
+class RangeLibrary(ModeLibrary):
+    """Contact modes of one range of speeds and one friction, filled for one spin speed after the other.
+
+    Parameters
+    ----------
+    reduced : ReducedModel
+        Matrices in the middle of the range; its spin and force are those of some speed.
+    phasor : (n,), complex
+        Unbalance at unit speed, kg m: at the speed W its force is `Re[W^2 phasor exp(i W t)]`, N.
+    tick : float, s
+    sample_level, n_level : int
+        As in `ModeLibrary`; levels stay, the tick changes with the speed.
+    reach : float, rad/s
+        Half of the range.
+    beside : sequence of ReducedModel
+        The same at other speeds of the range (`mode_courses.NODES`), through which modes follow the speed;
+        none where matrices stay what they are.
+    at_place : callable, optional
+        The same at a place in the range, from -1 to 1: for modes that cannot be
+        followed, which are solved at each piece.
+    is_balanced : bool
+        Whether energies are asked for.
+    buffers : dict, optional
+        Tables of the libraries that take turns, by what they have in common.
+    at_once : int
+        Pieces for whose speeds a contact mode is filled at once, at most.
+    """
+
+    _n_ahead = 0  # outputs are filled in for each speed
+
+    def __init__(
+        self,
+        reduced: ReducedModel,
+        model: Model,
+        friction: float,
+        *,
+        phasor: Complexes,
+        known: Solved,
+        tick: float,
+        sample_level: int,
+        n_level: int,
+        reach: float = 0.0,
+        beside: Sequence[ReducedModel] = (),
+        at_place: Callable[[float], ReducedModel] | None = None,
+        is_balanced: bool = True,
+        buffers: dict[tuple[object, ...], TableBuffer] | None = None,
+        at_once: int = AT_ONCE,
+    ) -> None:
+        """Start with every pair open."""
+        self.reduced, self._known, self._reach = _struck(reduced, phasor), known, reach
+        self._spin = reduced.spin
+        self._is_measured, self._at_place, self._at_once = is_balanced, at_place, at_once
+        self.gap_jacobian, self.force_direction, self.slip = directions(reduced, model, friction)
+        self._tick, self._sample_level, self._n_level = tick, sample_level, n_level
+        self._phasor, self._output = phasor, np.hstack(output_operators(reduced))
+        self._among: OpenBodies | None = None
+        self._opened, self._is_open = self._solve(0), True
+        self._among = open_bodies(reduced, model, self._opened)
+        self.first_masks = [0]
+        self.width = self._width_of(model, friction)
+        self._is_followed = bool(beside)
+        self._beside = [self._with(*other) for other in self._others(beside)]
+        self._exponents = {}
+        self._held: dict[int, tuple[ModeTables, ModeCourse]] = {}  # by the set of closed pairs
+        self._strange: set[int] = set()  # modes that cannot be followed
+        self._counted: tuple[tuple[int, ...], int] = (), 0  # modes, and their memory, bytes
+        kind: tuple[object, ...] = type(self), self.width, n_level, is_balanced
+        buffer = TableBuffer(TableStack(1 + len(self.gap_jacobian), self._most_modes))
+        self._buffer = buffer if buffers is None else buffers.setdefault(kind, buffer)
+        self._tables = self._buffer.tables
+        self.n_room = 0  # tables that each mode has, for as many pieces
+        # Of the modes in the buffer: the first of their tables, and up to which piece of those at hand they
+        # are filled.
+        self._place: dict[int, int] = {}
+        self._filled: dict[int, int] = {}
+        at_middle = [self._spin], [complex(self._spin**2)], [0.0], [tick]
+        self._speeds = speeds_of(*at_middle, self._spin, sample_level)
+        self._at = 0  # piece among those at hand
+        self._window = 0  # the first of the pieces for which there are tables
+        self.masks: list[int] = []
+        self._take_buffer()
+        self.add(0)
+
+    @property
+    def followed(self) -> RangeLibrary:
+        """Itself: all of a run-up is recorded."""
+        return self
+
+    @property
+    def n_byte(self) -> int:
+        """Memory that its contact modes hold."""
+        if self._counted[0] != (masks := tuple(self._held)):
+            fields = (field for kept in self._held.values() for part in kept for field in part)
+            sizes = {
+                id(field): field.nbytes
+                for field in fields
+                if isinstance(field, np.ndarray) and any(field.strides)
+            }
+            self._counted = masks, sum(sizes.values())
+        return self._counted[1]
+
+    @property
+    def is_tuned_ahead(self) -> bool:  # type: ignore[override]
+        """Whether a mode is filled for several pieces at once: pieces begin with those met before."""
+        return self.n_room > 1
+
+    @property
+    def n_most(self) -> int:
+        """Contact modes that there is room for."""
+        return self._tables.n_most // max(1, self.n_room)
+
+    @property
+    def window_end(self) -> int:
+        """The piece, of those at hand, from which on tables are filled anew."""
+        return self._window + self.n_room
+
+    @property
+    def is_full(self) -> bool:
+        """Whether there is no room for another contact mode."""
+        return len(self._held) >= self.n_most
+
+    def follows(self, mask: int) -> bool:
+        """Whether a mode follows the speed, in coordinates that go on from piece to piece."""
+        return self._is_followed and mask not in self._strange
+
+    def has_strange(self, met: set[int]) -> bool:
+        """Whether one of the modes met cannot be followed, and is solved at each piece."""
+        return not self._strange.isdisjoint(met)
+
+    def unmet(self, met: set[int]) -> list[int]:
+        """None: each piece begins with no mode."""
+        return []
+
+    def tune(self, speeds: Speeds, piece: int) -> None:
+        """Begin a piece, given by its place among the speeds: with no mode."""
+        self._take_buffer()
+        if speeds is not self._speeds or piece <= self._at:
+            self._speeds, self._filled = speeds, {}
+        self.reach(piece)
+
+    def reach(self, piece: int) -> None:
+        """Go on to a later piece of those at hand, with no mode, though some may be filled already."""
+        self._at = piece
+        window = piece - piece % max(1, self.n_room)
+        if window != self._window:
+            self._window, self._filled = window, {}
+        self.masks = [NOT_FILLED] * len(self.masks)
+        self.tables().mask[:] = NOT_FILLED
+
+    def add(self, mask: int) -> bool:
+        """Fill tables of the mode with these pairs closed; returns whether they are wide enough for it."""
+        if not self._has(mask):
+            return False
+        if mask not in self._place:
+            self._put(mask)
+        at, speeds = self._at, self._speeds
+        place = self._place[mask] + at - self._window
+        if self._filled.get(mask, 0) <= at:
+            end = min(speeds.spin.size, self.window_end)
+            if mask in self._strange:
+                self._solve_at(mask, place, float(speeds.within[at]))
+                end = at + 1
+            fill(self.tables(), place - at, self._held[mask][1], speeds, at, end)
+            self._filled[mask] = end
+        self.masks[place] = self.tables().mask[place] = mask
+        return True
+
+    def eigenmodes(self, mask: int, within: float) -> Eigenmodes | None:
+        """Those of a set of closed pairs at a place in the range, from -1 to 1.
+
+        None where a speed changes what enters them otherwise, or it has no room.
+        """
+        if mask not in self._held and self.is_full:
+            self.forget()
+        if not self._has(mask) or mask in self._strange:
+            return None
+        return Eigenmodes.of(*self._held[mask], within)
+
+    def filled(self, met: set[int]) -> Ints:
+        """Sets of closed pairs of the tables that are filled for this piece or later ones, of those met."""
+        found = np.full(len(self.masks), NOT_FILLED)
+        for mask, end in self._filled.items():
+            if mask in met:
+                first = self._place[mask] - self._window
+                found[first + self._at : first + end] = mask
+        return found
+
+    def forget(self) -> None:
+        """Make room: keep no mode but that with every pair open."""
+        self._exponents.clear()
+        self._held.clear()
+        if self._buffer.user is self:
+            self._buffer.user = None
+            self._take_buffer()
+            self.add(0)
+
+    def _take_buffer(self) -> None:
+        """Clear the buffer of what another library has left in it."""
+        if self._buffer.user is not self:
+            self._buffer.user = self
+            self._tables.clear()
+            self._place.clear()
+            self._filled.clear()
+            self.masks = []
+
+    def _put(self, mask: int) -> None:
+        """Put a mode into the buffer."""
+        row, place = self._held[mask][0], len(self.masks)
+        self.n_room = self.n_room or self._n_room_of(sum(field.nbytes for field in row))
+        self._place[mask] = place
+        self._tables.add(row, self.n_room)
+        self.masks += [NOT_FILLED] * self.n_room
+        self.tables().mask[place:] = NOT_FILLED
+
+    def _n_room_of(self, n_byte: int) -> int:
+        """Pieces for which a mode is filled at once, a power of two, by the memory of its tables for one."""
+        found = self._at_once
+        while found > 1 and found * n_byte > MOST_BYTES:
+            found //= 2
+        return found
+
+    def _has(self, mask: int) -> bool:
+        """Whether it has the mode with these pairs closed; one met for the first time is solved."""
+        if mask not in self._held:
+            mode = self._solved(mask)
+            if mode.exponent.size > self.width:
+                return False
+            self._tabulate(mode)
+        return True
+
+    def _tabulate(self, mode: ContactMode, row: ModeTables | None = None) -> None:
+        self._note_exponents(mode)
+        middle = self._node(mode)
+        course = self._constant(middle)
+        if self._beside:
+            found = [matched(mode, library._solved(mode.mask)) for library in self._beside]
+            nodes = [middle, *(lib._node(one) for lib, one in zip(self._beside, found, strict=True) if one)]
+            if len(nodes) > len(found) and (entered := entries(nodes)).lost <= MOST_LOST:
+                course = followed(course, nodes, entered)
+            if not course.courses.kept.size:
+                self._strange.add(mode.mask)
+        self._held[mode.mask] = without_filled(middle.row, len(self._output)), course
+
+    def _solve_at(self, mask: int, place: int, within: float) -> None:
+        """Solve a mode that cannot be followed at a place in the range, and put it into the buffer."""
+        assert self._at_place is not None
+        library = self._with(self._at_place(within), within)
+        node = library._node(library._solved(mask))
+        row, _ = self._held[mask] = without_filled(node.row, len(self._output)), library._constant(node)
+        for field, new in zip(self.tables(), row, strict=True):
+            field[place] = new[0]
+
+    def _node(self, mode: ContactMode) -> Node:
+        """A mode of these matrices, with its tables."""
+        row = self._tables_of(mode, self.reduced)
+        n = self.slip.shape[1]
+        shape, rate = mode.motion[:n], mode.motion[n:]
+        resisting = np.zeros((0, mode.exponent.size), dtype=np.complex128)
+        if self._is_measured:
+            reduced, friction = self._damped(mode.mask), self._friction_of(mode)
+            skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
+            resisting = reduced.damping @ rate + skew @ shape
+            if friction is not None:
+                resisting = resisting - friction
+        else:
+            row = with_slip(row, self._slip_rows() @ rate, mode.exponent)
+        return Node.of(mode, row, self._output, resisting)
+
+    def _constant(self, node: Node) -> ModeCourse:
+        """A mode that stays what it is."""
+        mask = node.mode.mask
+        spring, pressed = self._springs(mask) if self._is_measured else (0.0, [])
+        return constant_course(
+            node,
+            self._phasor,
+            n_ahead=1 if self._closed_pairs(mask) else SAMPLES_AT_ONCE,
+            spring=spring,
+            gap=self.gap_jacobian[pressed],
+            clearance=pressed,
+        )
+
+    def _others(self, beside: Sequence[ReducedModel]) -> list[tuple[ReducedModel, float]]:
+        """Matrices beside those in the middle, and their places in the range."""
+        return list(zip(beside, NODES[1:], strict=False))
+
+    def _with(self, reduced: ReducedModel, place: float = 0.0) -> Self:
+        """A library with other matrices, at a place in the range, that solves in the same way."""
+        other = copy(self)
+        other.reduced, other._output = _struck(reduced, self._phasor), np.hstack(output_operators(reduced))
+        other._beside, other._is_open = [], False
+        return other
+
+    def _solved(self, mask: int) -> ContactMode:
+        if not self._is_open:  # one beside another
+            self._is_open, self._opened = True, self._solve(0)
+            self._among = self._among.at(self.reduced, self._opened) if self._among else None
+        return super()._solved(mask)
+
+    def _energies_of(self, mode: ContactMode) -> Energies:
+        """Energies of a mode, whose order is not that of open bodies."""
+        found = energies_of(mode, self._damped(mode.mask), self._friction_of(mode), self.width)
+        return self._with_springs(found, mode)
+
+    def _spared(self, mode: ContactMode) -> None:
+        """None: outputs are filled in."""
+
+    def _width_of(self, model: Model, friction: float) -> int:
+        """Width of tables for any mode that is met later."""
+        return width_without_modes(self.reduced, model, friction, self._opened.exponent.size)
+
+
+def _struck(reduced: ReducedModel, phasor: Complexes) -> ReducedModel:
+    """The same under an unbalance so fast that no stiffness answers: what it drives is read off exactly."""
+    found = copy(reduced)  # including its cached projections
+    vars(found).update(spin=STRUCK, force=STRUCK**2 * np.stack([phasor.real, -phasor.imag]))
+    return found
