@@ -30,8 +30,10 @@ def claims(number: int | None, stores: str, is_json: bool, document: str | None,
     `make paper` runs the studies. Where the paper leaves a value open or contradicts itself, the result is
     only reported.
     """
-    from postproc.mokhtar2017.claims.index import CLAIMS, FAILS, evaluate, on_figure, open_studies
-    from postproc.mokhtar2017.claims.table import as_json, document_of, text
+    from postproc.mokhtar2017.claims.claim import FAILS
+    from postproc.mokhtar2017.claims.index import on_figure, open_studies
+    from postproc.mokhtar2017.claims.listing import as_json, document_of, text
+    from postproc.mokhtar2017.claims.table import CLAIMS
     from postproc.mokhtar2017.figures.index import FIGURES, draw_figures
 
     if document and number is not None:
@@ -40,7 +42,7 @@ def claims(number: int | None, stores: str, is_json: bool, document: str | None,
     figures = [n for n in FIGURES if number in (None, n)] if draw else []
     needed = [*(s for c in chosen for s in c.studies), *(s for n in figures for s in FIGURES[n].studies)]
     opened = open_studies(stores, needed)
-    results = evaluate(chosen, opened)
+    results = [claim.evaluate(opened) for claim in chosen]
     click.echo(as_json(results) if is_json else text(results, shutil.get_terminal_size((120, 24)).columns))
     if document:
         _write(Path(document), document_of(results))

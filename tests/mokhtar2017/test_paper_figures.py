@@ -18,9 +18,8 @@ PANELS = {
 
 
 def drawn(number, stores):
-    figure = FIGURES[number]
     with house_style():
-        return figure.draw(*(stores[name] for name in figure.studies))
+        return FIGURES[number].of(stores)
 
 
 @pytest.mark.parametrize("number", FIGURES)

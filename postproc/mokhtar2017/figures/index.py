@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from postproc.figures.style import house_style
+from postproc.mokhtar2017.claims import cases
 from postproc.mokhtar2017.figures import speed, stiffness, subcritical, supercritical
 from rubhpc.errors import InputError, reason_of
 
@@ -16,34 +17,48 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
+    from postproc.mokhtar2017.claims.cases import Cases
+
 
 @dataclass(frozen=True)
 class PaperFigure:
-    """One figure: how it is drawn, and the studies whose stores that takes."""
+    """One figure: the cases that it shows, and the function that draws them."""
 
+    shown: tuple[Cases, ...]
     draw: Callable[..., Figure]
-    studies: tuple[str, ...]
+
+    @property
+    def studies(self) -> list[str]:
+        """The studies whose stores are needed."""
+        return [cases.study for cases in self.shown]
+
+    def of(self, stores: Mapping[str, xr.Dataset]) -> Figure:
+        """Return the figure, drawn from stores."""
+        return self.draw(*(cases.of(stores) for cases in self.shown))
 
 
+_EXTREMES = {"stator_youngs_modulus": [cases.SOFT, cases.STIFF]}
 FIGURES: dict[int, PaperFigure] = {
-    3: PaperFigure(stiffness.lateral_freedom, ("lateral_freedom",)),
-    4: PaperFigure(stiffness.conventional_law, ("penalty", "subcritical")),
-    5: PaperFigure(speed.resonances, ("speed",)),
-    6: PaperFigure(subcritical.larger_gap, ("subcritical",)),
-    7: PaperFigure(subcritical.contacts, ("subcritical",)),
-    8: PaperFigure(subcritical.hilbert_larger_gap, ("subcritical",)),
-    9: PaperFigure(subcritical.sixth_harmonic, ("sixth_harmonic",)),
-    10: PaperFigure(subcritical.friction, ("subcritical",)),
-    11: PaperFigure(supercritical.friction, ("friction",)),
-    12: PaperFigure(supercritical.hilbert_at_three, ("friction",)),
-    13: PaperFigure(subcritical.smaller_gap, ("subcritical",)),
-    14: PaperFigure(subcritical.hilbert_smaller_gap, ("subcritical",)),
-    15: PaperFigure(supercritical.clearance, ("clearance",)),
-    16: PaperFigure(supercritical.hilbert_at_two, ("clearance",)),
-    17: PaperFigure(stiffness.below, ("subcritical",)),
-    18: PaperFigure(stiffness.near, ("resonance",)),
-    19: PaperFigure(stiffness.decay, ("subcritical", "resonance")),
-    20: PaperFigure(speed.cascade, ("speed",)),
+    3: PaperFigure((cases.FREEDOM,), stiffness.lateral_freedom),
+    4: PaperFigure((cases.WALL, cases.SMALL_GAP), stiffness.conventional_law),
+    5: PaperFigure((cases.STIFF_SPEEDS,), speed.resonances),
+    6: PaperFigure((cases.LARGE_GAP,), subcritical.larger_gap),
+    7: PaperFigure((cases.LARGE_GAP,), subcritical.contacts),
+    8: PaperFigure((cases.LARGE_GAP,), subcritical.hilbert_larger_gap),
+    9: PaperFigure((cases.SIXTH_HARMONIC,), subcritical.sixth_harmonic),
+    10: PaperFigure((cases.FRICTIONS,), subcritical.friction),
+    11: PaperFigure((cases.THREE,), supercritical.friction),
+    12: PaperFigure((cases.THREE.but(friction=0.3),), supercritical.hilbert_at_three),
+    13: PaperFigure((cases.SMALL_GAP,), subcritical.smaller_gap),
+    14: PaperFigure((cases.SMALL_GAP,), subcritical.hilbert_smaller_gap),
+    15: PaperFigure((cases.GAPS,), supercritical.clearance),
+    16: PaperFigure(
+        tuple(cases.GAPS.but(clearance=gap) for gap in (70e-6, 110e-6)), supercritical.hilbert_at_two
+    ),
+    17: PaperFigure((cases.SMALL_GAP.but(**_EXTREMES),), stiffness.compared),
+    18: PaperFigure((cases.NEAR_MODULI.but(**_EXTREMES),), stiffness.compared),
+    19: PaperFigure((cases.SMALL_GAP.but(**_EXTREMES), cases.NEAR_MODULI.but(**_EXTREMES)), stiffness.decay),
+    20: PaperFigure((cases.STIFF_SPEEDS, cases.FIRST), speed.cascade),
 }
 
 
@@ -62,10 +77,8 @@ def draw_figures(
         folder.mkdir(parents=True, exist_ok=True)
         for number in numbers:
             path = folder / f"fig{number:02d}.png"
-            figure = FIGURES[number]
             with house_style():
-                drawn = figure.draw(*(stores[name] for name in figure.studies))
-                drawn.savefig(path, dpi="figure", pil_kwargs={"optimize": True})
+                FIGURES[number].of(stores).savefig(path, dpi="figure", pil_kwargs={"optimize": True})
             yield path
     except OSError as error:
         raise InputError(

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 
 from postproc.figures.cascade import waterfall
 from postproc.figures.cascade_lines import draw_frequencies, draw_orders
-from postproc.mokhtar2017.claims.cases import STIFF, cases
-from postproc.mokhtar2017.claims.measures import strongest
-from postproc.mokhtar2017.claims.speed import (
+from postproc.mokhtar2017.claims.cases import RESONANCES
+from postproc.mokhtar2017.claims.quantities import (
+    at_speed,
     crest,
     largest_orbit,
-    pseudo_critical_frequency,
+    spin_frequency,
+    strongest,
     torsional_cascade,
 )
 from postproc.mokhtar2017.figures.page import page, title
@@ -28,31 +29,30 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _BESIDE = 0.2  # in r: the speeds shown on either side of a resonance
-_BANDS = ((1.2, 2.4), (2.8, 4.0), (4.6, 6.0))  # of r, that hold one resonance each
 _ORDERS = [Fraction(*f) for f in ((1, 3), (1, 2), (2, 3), (1, 1), (4, 3), (3, 2), (2, 1), (3, 1))]
 _LIMIT = 250.0  # Hz
 _HEIGHT = 0.16  # of the highest line, as a part of the ordinate
 
 
-def resonances(store: xr.Dataset) -> Figure:
+def resonances(every: xr.Dataset) -> Figure:
     """Fig. 5: orbits at and on either side of the largest one, for 1X, 1/2X and 1/3X."""
     figure, ax = page("abc", 85)
-    for panel, band in zip(ax.values(), _BANDS, strict=True):
-        at = float(largest_orbit(store, *band)["speed_ratio"])
-        near = cases(store, speed_ratio=[at - _BESIDE, at, at + _BESIDE], stator_youngs_modulus=STIFF)
+    for panel, ends in zip(ax.values(), RESONANCES, strict=True):
+        at = float(largest_orbit(every.sel(speed_ratio=slice(*ends)))["speed_ratio"])
+        near = every.sel(speed_ratio=[at - _BESIDE, at, at + _BESIDE], method="nearest")
         orbits(near, panel, "speed_ratio")
         panel.legend(loc="lower right")
         title(panel, f"about $r$ = {at:.1f}")
     return figure
 
 
-def cascade(store: xr.Dataset) -> Figure:
+def cascade(every: xr.Dataset, first: xr.Dataset) -> Figure:
     """Fig. 20: torsional spectra over speed, with orders, natural and pseudo-critical frequencies."""
-    spectra = torsional_cascade(store)
+    spectra = torsional_cascade(every)
     figure, axes = page("a", 140, width=140)
     ax = axes["a"]
-    torsional = float(natural_frequencies(cases(store, stator_youngs_modulus=STIFF))["torsional"])
-    bending = pseudo_critical_frequency(store)
+    torsional = float(natural_frequencies(every)["torsional"])
+    bending = spin_frequency(largest_orbit(first))
     waterfall(spectra, ax, _LIMIT, height=_HEIGHT)
     draw_orders(ax, spectra, _ORDERS)
     draw_frequencies(ax, spectra, {"torsional": torsional, "pseudo-critical": bending})
@@ -91,11 +91,10 @@ def _markers(
     for letter, (order, speed) in at.items():
         if math.isnan(speed):
             continue
-        line = spectra.sel(speed_ratio=speed, method="nearest")
-        line = line.sel(order=float(order), method="nearest")
+        line = at_speed(spectra, speed).sel(order=float(order), method="nearest")
         yield letter, speed, float(line["frequency"]), float(line)
-    ((_, frequency, amplitude),) = strongest(spectra.sel(speed_ratio=5.7, method="nearest"))
-    yield "f", 5.7, frequency, amplitude
+    (highest,) = strongest(at_speed(spectra, 5.7))
+    yield "f", 5.7, highest.hertz, highest.amplitude
 
 
 def _mark(ax: Axes, letter: str, frequency: float, speed: float, share: float) -> None:

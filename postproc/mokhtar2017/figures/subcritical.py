@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
-from postproc.mokhtar2017.claims.cases import LARGE_GAP_CASE, SMALL_GAP_CASE, cases
-from postproc.mokhtar2017.claims.friction import FRICTIONS
+from postproc.mokhtar2017.claims.quantities import spin_frequency
 from postproc.mokhtar2017.figures.hilbert import energy, share_bar, windowed
 from postproc.mokhtar2017.figures.page import page, title
 from postproc.mokhtar2017.figures.panels import closeup, legend, lines, orbits, over_time
@@ -19,9 +17,8 @@ if TYPE_CHECKING:
 _TURNS = 5  # revolutions in a Hilbert spectrum
 
 
-def larger_gap(store: xr.Dataset) -> Figure:
+def larger_gap(case: xr.Dataset) -> Figure:
     """Fig. 6: motion with the larger gap, over time and frequency, and as an orbit."""
-    case = cases(store, **LARGE_GAP_CASE)
     figure, ax = page("ab cd ef gh", 190)
     signals = {"vertical": "a", "horizontal": "c", "torsion": "e", "torsion_acceleration": "g"}
     over_time(case, {name: ax[letter] for name, letter in signals.items()})
@@ -31,9 +28,8 @@ def larger_gap(store: xr.Dataset) -> Figure:
     return figure
 
 
-def contacts(store: xr.Dataset) -> Figure:
+def contacts(case: xr.Dataset) -> Figure:
     """Fig. 7: the contact force, and what it leaves in the stator."""
-    case = cases(store, **LARGE_GAP_CASE)
     figure, ax = page("a b c", 125)
     over_time(case, {"contact_force": ax["a"], "stator_lateral": ax["b"]}, is_shaded=False)
     spans = contact_spans(case)
@@ -42,9 +38,8 @@ def contacts(store: xr.Dataset) -> Figure:
     return figure
 
 
-def hilbert_larger_gap(store: xr.Dataset) -> Figure:
+def hilbert_larger_gap(case: xr.Dataset) -> Figure:
     """Fig. 8: torsion under its windows, and the Hilbert spectra of torsion and stator."""
-    case = cases(store, **LARGE_GAP_CASE)
     figure, ax = page("a b c", 160)
     windowed(case, "torsion", ax["a"], _TURNS)
     energy(case, "torsion", ax["b"], _TURNS, 300)
@@ -53,29 +48,26 @@ def hilbert_larger_gap(store: xr.Dataset) -> Figure:
     return figure
 
 
-def sixth_harmonic(store: xr.Dataset) -> Figure:
+def sixth_harmonic(every: xr.Dataset) -> Figure:
     """Fig. 9: torsional spectra with 6X below, at and above the torsional natural frequency."""
-    every = cases(store)
     figure, ax = page("abc", 55)
     for i, panel in enumerate(ax.values()):
         case = every.isel(speed=i)
         lines(case, "torsion", panel, 300, n_line=1)
-        title(panel, f"spin {float(case['spin_speed']) / (2 * math.pi):.4g} Hz")
+        title(panel, f"spin {spin_frequency(case):.4g} Hz")
     return figure
 
 
-def friction(store: xr.Dataset) -> Figure:
+def friction(every: xr.Dataset) -> Figure:
     """Fig. 10: torsion and lateral motion of the stator over friction."""
-    every = cases(store, **LARGE_GAP_CASE | {"friction": FRICTIONS})
     figure, ax = page("a b", 95)
     over_time(every, {"torsion": ax["a"], "stator_lateral": ax["b"]}, 3, "friction")
     legend(ax["a"])
     return figure
 
 
-def smaller_gap(store: xr.Dataset) -> Figure:
+def smaller_gap(case: xr.Dataset) -> Figure:
     """Fig. 13: motion with the smaller gap."""
-    case = cases(store, **SMALL_GAP_CASE)
     figure, ax = page("ab cd ef", 150)
     signals = {"vertical": "a", "torsion": "b", "stator_lateral": "c", "contact_force": "d"}
     signals |= {"torsion_acceleration": "f"}
@@ -84,9 +76,8 @@ def smaller_gap(store: xr.Dataset) -> Figure:
     return figure
 
 
-def hilbert_smaller_gap(store: xr.Dataset) -> Figure:
+def hilbert_smaller_gap(case: xr.Dataset) -> Figure:
     """Fig. 14: spectra with the smaller gap, and Hilbert spectra of torsion and stator."""
-    case = cases(store, **SMALL_GAP_CASE)
     figure, ax = page("ab cd", 120)
     lines(case, "vertical", ax["a"], 150)
     lines(case, "torsion", ax["b"], 300)

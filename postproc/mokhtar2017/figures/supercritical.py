@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from postproc.mokhtar2017.claims.cases import cases
 from postproc.mokhtar2017.figures.hilbert import energy, share_bar
 from postproc.mokhtar2017.figures.page import page, title
 from postproc.mokhtar2017.figures.panels import legend, lines, orbits, over_time
@@ -14,9 +13,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def friction(store: xr.Dataset) -> Figure:
+def friction(every: xr.Dataset) -> Figure:
     """Fig. 11: torsion and orbit at r = 3 over friction."""
-    every = cases(store)
     figure, ax = page("aab", 62)
     over_time(every, {"torsion": ax["a"]}, 6, "friction")
     legend(ax["a"])
@@ -24,9 +22,8 @@ def friction(store: xr.Dataset) -> Figure:
     return figure
 
 
-def hilbert_at_three(store: xr.Dataset) -> Figure:
+def hilbert_at_three(case: xr.Dataset) -> Figure:
     """Fig. 12: spectrum of the horizontal motion at r = 3, and the Hilbert spectrum of torsion."""
-    case = cases(store, friction=0.3)
     figure, ax = page("ab", 62)
     lines(case, "horizontal", ax["a"], 200)
     energy(case, "torsion", ax["b"], 8, 350)
@@ -34,9 +31,8 @@ def hilbert_at_three(store: xr.Dataset) -> Figure:
     return figure
 
 
-def clearance(store: xr.Dataset) -> Figure:
+def clearance(every: xr.Dataset) -> Figure:
     """Fig. 15: motion at r = 2 over the gap."""
-    every = cases(store)
     figure, ax = page("ab cd ef", 150)
     signals = {"vertical": "a", "horizontal": "b", "torsion": "c", "torsion_acceleration": "d"}
     signals |= {"contact_force": "e"}
@@ -46,15 +42,15 @@ def clearance(store: xr.Dataset) -> Figure:
     return figure
 
 
-def hilbert_at_two(store: xr.Dataset) -> Figure:
+def hilbert_at_two(small: xr.Dataset, large: xr.Dataset) -> Figure:
     """Fig. 16: torsional spectra at r = 2 of the extreme gaps, and the Hilbert spectrum for the smaller."""
     figure, ax = page("ab cc", 115)
-    for letter, gap in (("a", 70e-6), ("b", 110e-6)):
-        lines(cases(store, clearance=gap), "torsion", ax[letter], 300, n_line=3)
-        title(ax[letter], f"$g$ = {gap * 1e6:.0f} µm")
+    for letter, case in (("a", small), ("b", large)):
+        lines(case, "torsion", ax[letter], 300, n_line=3)
+        title(ax[letter], f"$g$ = {1e6 * float(case['clearance']):.0f} µm")
     top = max(ax[letter].get_ylim()[1] for letter in "ab")
     for letter in "ab":
         ax[letter].set_ylim(0, top)
-    energy(cases(store, clearance=70e-6), "torsion", ax["c"], 6, 300)
+    energy(small, "torsion", ax["c"], 6, 300)
     share_bar([ax["c"]])
     return figure
