@@ -1,1 +1,1 @@
-"""What the paper claims of its figures, checked on the stores of `jobs/paper`; `table` declares the claims."""
+"""What the paper claims of its figures, checked on the stores of `jobs/paper`; `table` has the claims."""
