@@ -34,7 +34,8 @@ def claims(number: int | None, stores: str, is_json: bool, document: str | None,
     from postproc.mokhtar2017.claims.index import on_figure, open_studies
     from postproc.mokhtar2017.claims.listing import as_json, document_of, text
     from postproc.mokhtar2017.claims.table import CLAIMS
-    from postproc.mokhtar2017.figures.index import FIGURES, draw_figures
+    from postproc.mokhtar2017.figures.index import draw_figures
+    from postproc.mokhtar2017.figures.pages import FIGURES
 
     if document and number is not None:
         raise InputError("--document: contains all claims; leave out --figure")

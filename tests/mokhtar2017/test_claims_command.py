@@ -16,7 +16,7 @@ import rubhpc
 from postproc.mokhtar2017.claims.claim import FAILS, REPORTED
 from postproc.mokhtar2017.claims.index import open_studies
 from postproc.mokhtar2017.claims.table import CLAIMS
-from postproc.mokhtar2017.figures.index import FIGURES
+from postproc.mokhtar2017.figures.pages import FIGURES
 from rubhpc.rig.reading import read_rig
 from rubhpc.study.study import read_study
 

@@ -6,7 +6,8 @@ import pytest
 from synthetic_paper import SAMPLES
 
 from postproc.figures.style import house_style
-from postproc.mokhtar2017.figures.index import FIGURES, draw_figures
+from postproc.mokhtar2017.figures.index import draw_figures
+from postproc.mokhtar2017.figures.pages import FIGURES
 from postproc.mokhtar2017.figures.panels import between_contacts
 from rubhpc.errors import InputError
 

@@ -1,4 +1,4 @@
-"""Panels that several figures of the paper share: waveforms, orbits and spectra."""
+"""Pages of lettered panels, and the panels that several figures of the paper share."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from postproc.figures.overlay import overlaid
 from postproc.figures.spectrum import draw_spectrum
+from postproc.figures.style import COLUMN_WIDTH
 from postproc.figures.waveform import draw_waveform, shade_contacts
 from postproc.signals.lines import strongest_lines
 from postproc.signals.spectra import last_revolutions, samples_per_revolution, spectrum_data
@@ -21,7 +22,11 @@ if TYPE_CHECKING:
 
     import xarray as xr
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
+PAGE_WIDTH = 180 / 25.4  # inches, both columns
+_PAD = 0.045  # inches about a panel, so that the labels of one keep clear of the next
+_DOTS = 200  # an inch: what a screen shows of a page
 LABEL_WIDTH = 22  # characters left of a panel
 # Of overlaid curves, distinguishable without colour too.
 STYLES: tuple[Any, ...] = ("-", (0, (4, 1.5)), (0, (1, 1)))
@@ -29,27 +34,28 @@ STYLES: tuple[Any, ...] = ("-", (0, (4, 1.5)), (0, (1, 1)))
 
 def over_time(
     every: xr.Dataset,
-    panels: Mapping[str, Axes],
+    ax: Mapping[str, Axes],
+    signals: Mapping[str, str],
     revolutions: int = 4,
     over: str | None = None,
     is_shaded: bool = True,
 ) -> None:
-    """Draw the last revolutions of some signals, each in its panel, of one case or of several along an axis.
+    """Draw the last revolutions of signals of one case, or of several along an axis, each in its panel.
 
-    Contact is shaded where there is one case.
+    `signals` are names and the letters of their panels. Contact is shaded where there is one case.
     """
-    data = waveform_data(every, [*panels, "contact_force"], revolutions + 1, over)
+    data = waveform_data(every, [*signals, "contact_force"], revolutions + 1, over)
     start = between_contacts(data["contact_force"])
     n_sample = revolutions * samples_per_revolution(data["contact_force"])
     data = data.isel(sample=slice(start, start + n_sample)).load()
     data = from_zero(data, float(data["time"][0]))
-    for signal, ax in panels.items():
-        draw_waveform(data[signal], ax)
-        tidy(ax)
+    for signal, panel in ((name, ax[letter]) for name, letter in signals.items()):
+        draw_waveform(data[signal], panel)
+        tidy(panel)
         if over is None and is_shaded:
-            shade_contacts(data["contact_force"], ax)
+            shade_contacts(data["contact_force"], panel)
         if over is not None:
-            for line, style in zip(ax.get_lines(), STYLES, strict=False):
+            for line, style in zip(panel.get_lines(), STYLES, strict=False):
                 line.set_linestyle(style)
 
 
@@ -149,3 +155,32 @@ def tidy(ax: Axes) -> None:
     """Break the label of the ordinate and thin out its ticks, for a low panel."""
     ax.set_ylabel(fill(ax.get_ylabel(), LABEL_WIDTH))
     ax.locator_params(axis="y", nbins=5)
+
+
+def page(rows: str, height: float, width: float | None = None) -> tuple[Figure, dict[str, Axes]]:
+    """Return a figure and its panels by letter.
+
+    Parameters
+    ----------
+    rows : str
+        Rows of letters, as in "ab cc": panels a and b side by side over a wide panel c.
+    height, width : float
+        mm; by default, a page of one panel a row is one column wide, any other two.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    mosaic = rows.split()
+    inches = width / 25.4 if width else (PAGE_WIDTH if len(mosaic[0]) > 1 else COLUMN_WIDTH)
+    figure = Figure(figsize=(inches, height / 25.4), dpi=_DOTS)
+    FigureCanvasAgg(figure)
+    figure.get_layout_engine().set(w_pad=_PAD, h_pad=_PAD)  # type: ignore[union-attr, call-arg]
+    panels = figure.subplot_mosaic("\n".join(mosaic))
+    for letter, ax in panels.items():
+        ax.set_title(f"({letter})")
+    return figure, panels
+
+
+def title(ax: Axes, text: str) -> None:
+    """Add text after the letter of a panel."""
+    ax.set_title(f"{ax.get_title(loc='left')} {text}")
