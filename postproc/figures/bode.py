@@ -68,8 +68,7 @@ def bode(
         require_results(shown[f"amplitude_{name}"], cases)
     _require_one_unit(shown, signals)
 
-    speeds = shown["speed"].values
-    critical = critical_speeds(cases, float(np.nanmin(speeds)), float(np.nanmax(speeds)))
+    critical = critical_speeds(cases, shown["speed"])
 
     def draw(axes: list[Axes]) -> None:
         draw_bode(shown, signals, axes, order, critical)
@@ -110,10 +109,10 @@ def draw_bode(
     peaks: list[tuple[ResponsePeak, Line2D, bool]] = []
     for i_signal, name in enumerate(signals):
         amplitude, phase = data[f"amplitude_{name}"], data[f"phase_{name}"]
-        curves = zip(overlaid(amplitude, along), overlaid(phase, along), strict=True)
+        touch = data.get("contact_fraction", 0.0 * speeds)
         before: tuple[Floats, Floats] | None = None
-        for i_case, ((case, height), (_, lead)) in enumerate(curves):
-            own_speeds = speeds.isel({over: i_case}) if over in speeds.dims else speeds
+        curves = overlaid(along, amplitude, phase, speeds, touch.fillna(0.0))
+        for i_case, (case, height, lead, own_speeds, touches) in enumerate(curves):
             rpm = own_speeds.values * RPM
             own = name.removeprefix("probe_").replace("_", " ") if len(signals) > 1 else None
             label = ", ".join(text for text in (own, case) if text) or None
@@ -129,15 +128,12 @@ def draw_bode(
                 top.plot(rpm, np.where(back, size, np.nan), **faint)
                 bottom.plot(rpm, np.where(back, lag, np.nan), **faint)
                 has_fallen = True
-            touch = np.zeros(rpm.size)
-            if "contact_fraction" in data:
-                contact = data["contact_fraction"]
-                touch = np.nan_to_num(contact.isel({over: i_case} if over in contact.dims else {}).values)
             for way in (~back, back) if order == 1.0 else ():
                 at = own_speeds.values[way]
                 for peak in peaks_of(at, size[way], lag[way], is_swept):
                     low, high = peak.half_power_speeds
-                    peaks.append((peak, curve, bool((touch[way][(at >= low) & (at <= high)] > 0.0).any())))
+                    rubs = touches.values[way][(at >= low) & (at <= high)] > 0.0
+                    peaks.append((peak, curve, bool(rubs.any())))
     shown = [signal_name(data[f"amplitude_{signals[0]}"])] if len(signals) == 1 else []
     top.set_title(", ".join([*shown, written_order(order)]), fontsize=8)
     top.set(ylabel=scale.label("Amplitude, 0\N{EN DASH}peak"), xlim=ends)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from postproc.figures.label_places import LEADER, Labels
+from postproc.figures.label_places import Labels
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -27,7 +27,7 @@ STYLES: dict[str, dict[str, Any]] = {
     "axial": {"color": "C3", "linestyle": (0, (1, 1.2))},
 }
 ORDERS = (1, 2)
-_SIZE, _DIGIT, _LINE, _GAP = 6.0, 3.8, 8.0, 3.0  # pt: numbers, width of a digit, height of a line, gap
+_DIGIT, _LINE, _GAP = 3.8, 8.0, 3.0  # pt: width of a digit, height of a line, gap
 _CRITICAL: dict[str, Any] = {
     "linestyle": "", "marker": "o", "markersize": 3, "color": "k", "markerfacecolor": "white", "zorder": 3,
 }  # fmt: skip
@@ -114,18 +114,7 @@ def _number(ax: Axes, speeds: NDArray[np.float64]) -> None:
     curves = (np.asarray(curve.get_xydata(), dtype=float).T for curve in ax.lines)
     labels = Labels(ax, [(x, y) for x, y in curves if np.isfinite(x + y).any()])
     for line in lines:
-        at = np.array([line[-1], line[-1] / 60])
-        offset, is_far = labels.place(_line(line), at, np.array([1.0, -1.0]))
-        ax.annotate(
-            _line(line),
-            tuple(at),
-            xytext=tuple(offset),
-            textcoords="offset points",
-            ha="center",
-            va="center",
-            fontsize=_SIZE,
-            arrowprops=LEADER if is_far else None,
-        )
+        labels.write(_line(line), np.array([line[-1], line[-1] / 60]), np.array([1.0, -1.0]))
 
 
 def _line(speeds: list[float]) -> str:

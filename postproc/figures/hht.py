@@ -10,6 +10,7 @@ import numpy as np
 
 from postproc.figures.drawing import Drawing
 from postproc.figures.options import end_of_abscissa
+from postproc.signals.contacts import runs_of
 from postproc.signals.hilbert_huang import (
     contact_bandwidth,
     energy_picture,
@@ -183,9 +184,8 @@ def _draw_energy(
 
 def _shade(hht: xr.Dataset, ax: Axes, factor: float) -> None:
     time = hht["time"].values
-    ends = np.diff(np.pad(hht["contact"].values.astype(np.int8), 1))
     dt = time[1] - time[0]
-    for first, end in zip(np.flatnonzero(ends == 1), np.flatnonzero(ends == -1), strict=True):
+    for first, end in zip(*runs_of(hht["contact"].values), strict=True):
         ax.axvspan(first * dt * factor, end * dt * factor, color=_SHADE, linewidth=0, zorder=0)
 
 

@@ -20,7 +20,8 @@ _GAP = 2.5  # points, of a label from its mark in each direction
 _LETTER, _HEIGHT = 3.9, 6.0  # points, of a letter and its margin at the size of labels
 _MARK = 3.0  # points, half the size of a mark
 _FARTHER = (0.0, 10.0, 22.0)  # points
-LEADER = {"arrowstyle": "-", "linewidth": 0.4, "color": "0.4", "shrinkA": 1.0, "shrinkB": 1.5}
+_SIZE = 6.0  # points, of labels
+_LEADER = {"arrowstyle": "-", "linewidth": 0.4, "color": "0.4", "shrinkA": 1.0, "shrinkB": 1.5}
 _AROUND = [(across, up) for across in (-1, 0, 1) for up in (-1, 0, 1) if across or up]
 
 
@@ -28,6 +29,7 @@ class Labels:
     """Curves and labels of a plot, in points from its lower left corner; set its limits first."""
 
     def __init__(self, ax: Axes, curves: Sequence[tuple[Floats, Floats]]) -> None:
+        self._ax = ax
         self._low = np.array([ax.get_xlim()[0], ax.get_ylim()[0]])
         spans = np.array([np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim())])
         box = np.array(ax.bbox.size) * 72.0 / ax.figure.dpi
@@ -43,11 +45,25 @@ class Labels:
             if len(points) == 1:  # a mark
                 self._boxes.append((self._at(points[0]), np.full(2, _MARK)))
 
-    def place(self, text: str, at: Floats, away: Floats) -> tuple[Floats, bool]:
-        """Where the middle of a label goes from its point, points, if possible the way `away`.
+    def write(self, text: str, at: Floats, away: Floats) -> None:
+        """Write a label of a point where it covers least, with a leader where that is far from the point.
 
-        And whether that is so far that it needs a leader.
+        If possible it is in the direction `away`.
         """
+        offset, is_far = self._place(text, at, away)
+        self._ax.annotate(
+            text,
+            (at[0], at[1]),
+            xytext=(offset[0], offset[1]),
+            textcoords="offset points",
+            ha="center",
+            va="center",
+            fontsize=_SIZE,
+            arrowprops=_LEADER if is_far else None,
+        )
+
+    def _place(self, text: str, at: Floats, away: Floats) -> tuple[Floats, bool]:
+        """Where the middle of a label goes from its point, points, and whether it needs a leader."""
         half = _half(text)
         found, least = half, math.inf
         for farther, direction in itertools.product(_FARTHER, _AROUND):

@@ -109,8 +109,7 @@ def draw_orbit(data: xr.Dataset, ax: Axes, frame: str = "orbit") -> Axes:
         if is_mean or not is_seen:
             title.append(f"mean {_written(mean[1], scale)} vertical, {_written(mean[0], scale)} horizontal")
     else:
-        curves = zip(overlaid(vertical, "sample"), overlaid(horizontal, "sample"), strict=True)
-        for (name, y), (_, z) in curves:
+        for name, y, z in overlaid("sample", vertical, horizontal):
             ax.plot(z.values * scale.factor, y.values * scale.factor, linewidth=0.5, label=name)
     if title:
         ax.set_title("; ".join(title), fontsize=7)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from postproc.store.units import written_value
 from rubhpc.errors import InputError
@@ -13,21 +13,26 @@ if TYPE_CHECKING:
 MOST = 7  # curves that have a colour of their own
 
 
-def overlaid(data: xr.DataArray, own: str) -> list[tuple[str | None, xr.DataArray]]:
-    """Return the cases to draw over one another, each with its name for a legend; of one case, no name.
+def overlaid(own: str, *data: xr.DataArray) -> list[tuple[Any, ...]]:
+    """Return the cases to draw over one another: its name for a legend, of one case None, and its data.
 
-    `own` is the dimension of a curve; the other, if there is one, is the axis of the study to spread over.
+    `own` is the dimension of a curve; another of the first data, if there is one, is the axis of the study to
+    spread over.
 
     Raises
     ------
     InputError
         There are more curves than can be distinguished.
     """
-    over = next((d for d in data.dims if d != own), None)
+    first = data[0]
+    over = next((d for d in first.dims if d != own), None)
     if over is None:
-        return [(None, data)]
-    n_curve = data.sizes[over]
+        return [(None, *data)]
+    n_curve = first.sizes[over]
     if n_curve > MOST:
         hint = f"keep at most {MOST}, as in --select {over}=VALUE,VALUE"
         raise InputError(f"{over}: {n_curve} curves over one another cannot be distinguished; {hint}")
-    return [(written_value(data[over][i]), data.isel({over: i})) for i in range(n_curve)]
+    return [
+        (written_value(first[over][i]), *(one.isel({over: i}) if over in one.dims else one for one in data))
+        for i in range(n_curve)
+    ]

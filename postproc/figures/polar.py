@@ -51,8 +51,7 @@ def polar(
     if not shown[f"phase_{signal}"].notnull().any():
         problem = f"{written_order(order)} is none, or lost in other motion, and has no phase"
         raise InputError(f"{signal}: {problem}; draw its amplitude with rubhpc bode")
-    speeds = shown["speed"].values
-    critical = critical_speeds(cases, float(np.nanmin(speeds)), float(np.nanmax(speeds)))
+    critical = critical_speeds(cases, shown["speed"])
     angle = _seen_from(cases, signal)
     return Drawing(
         shown=shown,
@@ -75,11 +74,8 @@ def draw_polar(
     scale = scale_for(str(amplitude.attrs.get("units", "1")), float(np.nanmax(amplitude.values)))
     reach = 1.12 * float(np.nanmax(amplitude.values)) * scale.factor or 1.0
     _draw_grid(ax, reach, angle, _emptiest(amplitude.values, phase.values))
-    over = next((dim for dim in amplitude.dims if dim != along), None)
-    pairs = zip(overlaid(amplitude, along), overlaid(phase, along), strict=True)
     curves, n_curve = [], 0
-    for i_case, ((case, height), (_, lead)) in enumerate(pairs):
-        own = speeds.isel({over: i_case}) if over in speeds.dims else speeds
+    for case, height, lead, own in overlaid(along, amplitude, phase, speeds):
         # Drawn as seen from the drive end: clockwise is the sense of spin, and a lead turns with it.
         turned = angle + lead.values
         x, y = (

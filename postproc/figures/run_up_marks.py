@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from postproc.figures.label_places import LEADER, Labels
+from postproc.figures.label_places import Labels
 from postproc.store.rig_of_case import rig_axes, rig_of
 from rubhpc.rig.reading import rig_from_dict
 
@@ -28,11 +28,12 @@ _BACK = 0.1  # of the way of a speed, up to which it may go back and counts as g
 _STEPS = 60  # of speed, on which modes are followed
 
 
-def critical_speeds(cases: xr.Dataset, low: float, high: float) -> list[float]:
-    """Return the lateral critical speeds that the unbalance excites, rad/s, within a range; [] if unknown.
+def critical_speeds(cases: xr.Dataset, speeds: xr.DataArray) -> list[float]:
+    """Return the lateral critical speeds that the unbalance excites, rad/s, among speeds; [] if unknown.
 
     Where keys of the rig have several values there is no one rig, and none is returned.
     """
+    low, high = float(speeds.min()), float(speeds.max())
     is_varied = any(cases[name].size > 1 for name in rig_axes(cases) if name in cases.coords)
     if "rig" not in cases.attrs or is_varied or not low < high:
         return []
@@ -101,17 +102,7 @@ def name_speeds(
         taken.append((px, py))
         ax.plot(px, py, ".", color="k", markersize=3, zorder=4)
         away = np.array([px - middle[0], py - middle[1]])
-        offset, is_far = written.place(text, np.array([px, py]), away / (np.hypot(*away) or 1.0))
-        ax.annotate(
-            text,
-            (px, py),
-            xytext=tuple(offset),
-            textcoords="offset points",
-            ha="center",
-            va="center",
-            fontsize=6,
-            arrowprops=LEADER if is_far else None,
-        )
+        written.write(text, np.array([px, py]), away / (np.hypot(*away) or 1.0))
 
 
 def _round_speeds(x: Floats, y: Floats, rpm: Floats) -> Iterator[tuple[str, float, float]]:

@@ -17,6 +17,7 @@ from postproc.signals.places import signal_or_whirl
 from postproc.signals.run_up_spectra import run_up_spectra
 from postproc.signals.spectra import spectrum_data
 from postproc.store.rig_of_case import frequencies_at_speed
+from postproc.store.select import narrow
 from postproc.store.units import scale_of, short_name
 from postproc.store.variables import require_results
 
@@ -86,7 +87,7 @@ def spectrum(
     cases, name = signal_or_whirl(cases, signal, "torsion", full, probes, node, stator)
     if at is None:
         shown = spectrum_data(cases, name, over).compute()
-        speed = float(cases["spin_speed"]) if over is None else None
+        speed = float(narrow(cases, ["spin_speed"])["spin_speed"]) if over is None else None
     else:
         speed = spin_speed(at, "--at")
         one = run_up_spectra(cases, name, _WINDOW, 1, speed).isel(place=0)
@@ -129,7 +130,7 @@ def draw_spectrum(
     amplitude = amplitude.where(is_line)
     scale = scale_of(amplitude)
     end = float(np.nanmax(amplitude[abscissa].values)) if limit is None else limit
-    for name, curve in overlaid(amplitude, "order"):
+    for name, curve in overlaid("order", amplitude):
         ax.plot(
             *spikes(curve[abscissa].values, curve.fillna(0.0).values * scale.factor, SPIKE * end),
             label=name,
@@ -158,7 +159,7 @@ def draw_spectrum(
 def default_limit(amplitude: xr.DataArray, abscissa: str = "frequency") -> float:
     """Return the default end of the abscissa: beyond the strongest lines, and not before 4X."""
     ends: list[float] = []
-    for _, curve in overlaid(amplitude, "order"):
+    for _, curve in overlaid("order", amplitude):
         first = float(curve[abscissa].values[-1] / curve["order"].values[-1])  # 1X
         lines = strongest_lines(curve)[abscissa].values
         least = 2.2 if curve["order"].values[0] < 0 else 4.2

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rubhpc.errors import InputError, reason_of
+from rubhpc.errors import InputError, writing
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -77,12 +77,7 @@ def check_figure_path(path: str | Path) -> Path:
 def save(figure: Figure, path: str | Path) -> Path:
     """Write the figure as png, pdf or svg, by its extension, and return its path."""
     path = check_figure_path(path)
-    try:
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", "constrained_layout not applied")  # labels of very long numbers
-            figure.savefig(path)
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot be written: {reason_of(error, path)}; choose another --figure"
-        ) from error
+    with writing(path, "--figure"), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "constrained_layout not applied")  # labels of very long numbers
+        figure.savefig(path)
     return path

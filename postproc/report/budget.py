@@ -10,7 +10,7 @@ from postproc.report.cases import spread
 from postproc.report.detail import LEVELS
 from postproc.report.packing import pack_floats
 from postproc.report.page import Page, least_size, text_size
-from rubhpc.errors import InputError, reason_of
+from rubhpc.errors import InputError, writing
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -52,10 +52,8 @@ def write_report(store: xr.Dataset, path: Path, limit: float) -> Load:
     room -= _load_measures(page, load, room, limit)
     _load_records(page, load, room)
     text = page.html(load.values, load.records, load.notes)
-    try:
+    with writing(path):
         path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {reason_of(error, path)}; choose another") from error
     return load
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from rubhpc.errors import InputError, reason_of
+from rubhpc.errors import InputError, writing
 
 FOLDER = "paper"  # where the studies of jobs/paper put their stores
 
@@ -46,17 +46,9 @@ def claims(number: int | None, stores: str, is_json: bool, document: str | None,
     results = [claim.evaluate(opened) for claim in chosen]
     click.echo(as_json(results) if is_json else text(results, shutil.get_terminal_size((120, 24)).columns))
     if document:
-        _write(Path(document), document_of(results))
+        with writing(Path(document), "--document"):
+            Path(document).write_text(document_of(results), encoding="utf-8")
     if draw:
         for path in draw_figures(figures, opened, draw):
             click.echo(str(path), err=is_json)
     return int(any(result.verdict == FAILS for result in results))
-
-
-def _write(path: Path, content: str) -> None:
-    try:
-        path.write_text(content, encoding="utf-8")
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot be written: {reason_of(error, path)}; choose another --document"
-        ) from error

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from postproc.figures.style import house_style
 from postproc.mokhtar2017.figures.pages import FIGURES
-from rubhpc.errors import InputError, reason_of
+from rubhpc.errors import writing
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -26,14 +26,10 @@ def draw_figures(
         The folder cannot be made or written to.
     """
     folder = Path(folder)
-    try:
+    with writing(folder, "--draw"):
         folder.mkdir(parents=True, exist_ok=True)
         for number in numbers:
             path = folder / f"fig{number:02d}.png"
             with house_style():
                 FIGURES[number].of(stores).savefig(path, dpi="figure", pil_kwargs={"optimize": True})
             yield path
-    except OSError as error:
-        raise InputError(
-            f"{folder}: cannot be written: {reason_of(error, folder)}; choose another --draw"
-        ) from error

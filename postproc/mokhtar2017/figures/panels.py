@@ -112,7 +112,7 @@ def orbits(
     motion = [every[n].load() for n in ("vertical", "horizontal")]
     scale = scale_for("m", float(max(abs(signal).max() for signal in motion)))
     periods = np.atleast_1d(every["period"].values)
-    for i, ((name, y), (_, z)) in enumerate(zip(*(overlaid(s, "sample") for s in motion), strict=True)):
+    for i, (name, y, z) in enumerate(overlaid("sample", *motion)):
         # One period and no more: dashes that lie over one another make a full line.
         shown = [last_revolutions(s, int(periods[i]) or revolutions).values * scale.factor for s in (z, y)]
         is_closed = periods[i] > 0
