@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -226,7 +227,5 @@ def signal_name(amplitude: xr.DataArray) -> str:
 
 def written_order(order: float) -> str:
     """An order as engineers write it: 1X, 1/2X, 2X."""
-    for part in range(1, 9):
-        if abs(order * part - round(order * part)) < 1e-3:
-            return f"{round(order * part)}{'' if part == 1 else f'/{part}'}X"
-    return f"{order:.3g}X"
+    near = Fraction(order).limit_denominator(8)
+    return f"{near}X" if abs(order - near) * near.denominator < 1e-3 else f"{order:.3g}X"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from postproc.figures.cascade_lines import name_senses
+from postproc.figures.cascade_lines import ABSCISSA_LABELS, name_senses
 from postproc.figures.drawing import Drawing
 from postproc.figures.options import end_of_abscissa, spin_speed
 from postproc.figures.overlay import overlaid
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 _LABEL_WIDTH = 38  # characters that fit next to a panel
 _WINDOW = 32  # revolutions in a spectrum of a run-up
 _FLOOR = 1e-5  # of the highest line, on a log scale
-_NAMES = {"frequency": "Frequency (Hz)", "order": "Order (multiples of spin speed)"}
 
 
 def spectrum(
@@ -150,7 +149,7 @@ def draw_spectrum(
         _name_lines(ax, lines, scale.factor, abscissa)
     if amplitude.ndim > 1:
         ax.legend(loc="upper right")
-    ax.set_xlabel(_NAMES[abscissa])
+    ax.set_xlabel(ABSCISSA_LABELS[abscissa])
     ax.set_ylabel(fill(scale.label(f"{short_name(amplitude)} amplitude"), _LABEL_WIDTH))
     name_senses(ax, is_above=True)
     return ax
