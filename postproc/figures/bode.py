@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from postproc.figures.cells import degree_steps
 from postproc.figures.drawing import Drawing
-from postproc.figures.overlay import overlaid
 from postproc.figures.run_up_marks import RPM, critical_speeds, falling, written_speeds
-from postproc.figures.ticks import degree_steps
+from postproc.figures.small_multiples import overlaid
 from postproc.signals.orders import order_over_speed, written_lag
 from postproc.store.run_ups import is_run_up
 from postproc.store.units import short_name

@@ -14,10 +14,9 @@ from postproc.figures.cascade_lines import (
     name_senses,
     ordinate,
 )
-from postproc.figures.cells import cell_edges, is_geometric
+from postproc.figures.cells import cell_edges, is_geometric, tick_levels
 from postproc.figures.drawing import Drawing
 from postproc.figures.options import end_of_abscissa, hertz
-from postproc.figures.ticks import tick_levels
 from postproc.signals.cascade import below, default_axis, hold_peaks, hold_rows
 from postproc.signals.cascade import cascade as cascade_data
 from postproc.signals.lines import SPIKE, parse_orders, spikes

@@ -19,8 +19,8 @@ from postproc.signals.hilbert_huang import (
     span_frequencies,
 )
 from postproc.store.rig_of_case import natural_frequencies, stator_frequencies
+from postproc.store.select import at_most_loaded_stator
 from postproc.store.units import plain_number, scale_of, short_name
-from postproc.store.worst import at_most_loaded_stator
 from rubhpc.errors import InputError
 from rubhpc.units import scale_for
 

@@ -9,9 +9,8 @@ import numpy as np
 
 from postproc.figures.drawing import Drawing
 from postproc.figures.options import spin_speed
-from postproc.figures.overlay import overlaid
 from postproc.figures.run_up_marks import draw_rotation, title_of_speeds
-from postproc.figures.small_multiples import legend_below
+from postproc.figures.small_multiples import legend_below, overlaid
 from postproc.signals.places import moved_at
 from postproc.signals.spectra import samples_per_revolution
 from postproc.signals.waveforms import orbit_data

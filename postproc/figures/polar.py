@@ -8,8 +8,8 @@ import numpy as np
 
 from postproc.figures.bode import signal_name, written_order
 from postproc.figures.drawing import Drawing
-from postproc.figures.overlay import overlaid
 from postproc.figures.run_up_marks import critical_speeds, draw_rotation, name_speeds, written_speeds
+from postproc.figures.small_multiples import overlaid
 from postproc.signals.orders import order_over_speed
 from postproc.store.run_ups import is_run_up
 from postproc.store.variables import probe_of, probes_of, require_results

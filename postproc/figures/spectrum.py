@@ -10,11 +10,10 @@ import numpy as np
 from postproc.figures.cascade_lines import ABSCISSA_LABELS, name_senses
 from postproc.figures.drawing import Drawing
 from postproc.figures.options import end_of_abscissa, spin_speed
-from postproc.figures.overlay import overlaid
-from postproc.figures.small_multiples import write_over
+from postproc.figures.small_multiples import overlaid, write_over
 from postproc.signals.lines import SPIKE, spikes, strongest_lines
 from postproc.signals.places import signal_or_whirl
-from postproc.signals.run_up_spectra import run_up_spectra
+from postproc.signals.run_ups import run_up_spectra
 from postproc.signals.spectra import spectrum_data
 from postproc.store.rig_of_case import frequencies_at_speed
 from postproc.store.select import narrow

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from postproc.figures.drawing import Drawing
-from postproc.figures.overlay import overlaid
 from postproc.figures.run_up_marks import RPM, critical_speeds
-from postproc.signals.spin import spin_over_time
+from postproc.figures.small_multiples import overlaid
+from postproc.signals.run_ups import spin_over_time
 from postproc.store.variables import require_results
 from rubhpc.units import scale_for
 

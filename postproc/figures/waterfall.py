@@ -12,7 +12,7 @@ from postproc.figures.drawing import Drawing
 from postproc.figures.options import end_of_abscissa
 from postproc.figures.run_up_marks import RPM, falling
 from postproc.signals.places import signal_or_whirl
-from postproc.signals.run_up_spectra import run_up_spectra
+from postproc.signals.run_ups import run_up_spectra
 from postproc.store.units import plain_number, scale_of, short_name
 
 if TYPE_CHECKING:

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 
 from postproc.figures.drawing import Drawing
 from postproc.figures.options import spin_speed
-from postproc.figures.overlay import overlaid
 from postproc.figures.run_up_marks import title_of_speeds
-from postproc.figures.small_multiples import legend_below
+from postproc.figures.small_multiples import legend_below, overlaid
 from postproc.signals.contacts import runs_of
 from postproc.signals.waveforms import DEFAULT_SIGNALS, waveform_data
 from postproc.store.units import displayed, scale_of, short_name
@@ -18,7 +17,6 @@ from postproc.store.variables import require_results
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from re import Match
 
     import xarray as xr
     from matplotlib.axes import Axes
@@ -83,7 +81,8 @@ def draw_panels(data: xr.Dataset, axes: Sequence[Axes]) -> list[Axes]:
     signals = [str(n) for n, v in data.data_vars.items() if "sample" in v.dims]
     for ax, name in zip(axes, signals, strict=True):
         draw_waveform(data[name], ax)
-        ax.set_ylabel(fill(_UNIT.sub(_unbroken, ax.get_ylabel()), _LABEL_WIDTH), fontsize=7)
+        label = _UNIT.sub(lambda unit: unit[0].replace(" ", "\N{NO-BREAK SPACE}"), ax.get_ylabel())
+        ax.set_ylabel(fill(label, _LABEL_WIDTH), fontsize=7)
         ax.label_outer()
         ax.locator_params(axis="y", nbins=4)
         ax.locator_params(axis="x", nbins=5)
@@ -102,10 +101,6 @@ def shade_contacts(force: xr.DataArray, ax: Axes) -> None:
     half = (x[1] - x[0]) / 2  # a sample is a mean over its interval
     for first, end in zip(*runs_of(force.values > 0), strict=True):
         ax.axvspan(x[first] - half, x[end - 1] + half, color="0.9", linewidth=0, zorder=0)
-
-
-def _unbroken(unit: Match[str]) -> str:
-    return unit[0].replace(" ", "\N{NO-BREAK SPACE}")
 
 
 def _abscissa(signal: xr.DataArray) -> xr.DataArray:

@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from postproc.report.cases import spread
-from postproc.report.detail import LEVELS
-from postproc.report.packing import pack_floats
+from postproc.report.packing import LEVELS, pack_floats
 from postproc.report.page import Page, least_size, text_size
 from rubhpc.errors import InputError, writing
 
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from postproc.report.cases import Cases
-    from postproc.report.detail import Detail
+    from postproc.report.packing import Detail
 
 _NEEDED = ("status", "validity")  # without which a page shows nothing
 _SHARE_OF_MEASURES = 0.5  # of the room for data, at most

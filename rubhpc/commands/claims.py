@@ -30,12 +30,10 @@ def claims(number: int | None, stores: str, is_json: bool, document: str | None,
     `make paper` runs the studies. Where the paper leaves a value open or contradicts itself, the result is
     only reported.
     """
-    from postproc.mokhtar2017.claims.claim import FAILS
-    from postproc.mokhtar2017.claims.index import on_figure, open_studies
-    from postproc.mokhtar2017.claims.listing import as_json, document_of, text
-    from postproc.mokhtar2017.claims.table import CLAIMS
-    from postproc.mokhtar2017.figures.index import draw_figures
-    from postproc.mokhtar2017.figures.pages import FIGURES
+    from postproc.mokhtar2017.claims.cases import open_studies
+    from postproc.mokhtar2017.claims.claim import FAILS, as_json, document_of, text
+    from postproc.mokhtar2017.claims.table import CLAIMS, on_figure
+    from postproc.mokhtar2017.figures.pages import FIGURES, draw_figures
 
     if document and number is not None:
         raise InputError("--document: contains all claims; leave out --figure")

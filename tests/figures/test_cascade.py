@@ -13,7 +13,7 @@ import xarray as xr
 from postproc.figures.cascade import cascade as cascade_figure
 from postproc.figures.cascade import default_limit, intensity, waterfall
 from postproc.figures.cascade_lines import draw_frequencies, draw_orders
-from postproc.figures.style import house_style, new_figure
+from postproc.figures.drawing import house_style, new_figure
 from postproc.signals.cascade import below, cascade, hold_peaks, hold_rows
 from postproc.store.rig_of_case import natural_frequencies, stator_places
 from postproc.store.select import select

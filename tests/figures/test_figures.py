@@ -9,12 +9,12 @@ from matplotlib.markers import TICKDOWN, TICKRIGHT
 
 from postproc.cases.maps import default_axes, map_data
 from postproc.figures.cells import cell_edges, hatch_cells, outline_cells
+from postproc.figures.drawing import check_figure_path, house_style, new_figure, save
 from postproc.figures.map import value_maps
 from postproc.figures.orbit import draw_orbit, orbit
-from postproc.figures.overlay import overlaid
 from postproc.figures.section import draw_section
+from postproc.figures.small_multiples import overlaid
 from postproc.figures.spectrum import default_limit, draw_spectrum
-from postproc.figures.style import check_figure_path, house_style, new_figure, save
 from postproc.figures.waveform import draw_panels, draw_waveform
 from postproc.signals.lines import strongest_lines
 from postproc.signals.sections import section_data

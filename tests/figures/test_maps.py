@@ -11,10 +11,10 @@ from click.testing import CliRunner
 from postproc.cases.maps import default_axes, facet_axes, map_data
 from postproc.catalogue import figures
 from postproc.figures.cells import cell_edges
+from postproc.figures.drawing import house_style, new_figure
 from postproc.figures.map import map as draw_map
 from postproc.figures.map import value_maps
 from postproc.figures.small_multiples import name_facets
-from postproc.figures.style import house_style, new_figure
 from postproc.store.open import open_store
 from rubhpc.commands.figures import figure_command
 from rubhpc.errors import InputError

@@ -16,7 +16,7 @@ from postproc.figures.run_up_marks import critical_speeds, name_speeds
 from postproc.figures.spectrum import spectrum
 from postproc.figures.speed import speed
 from postproc.figures.waterfall import waterfall
-from postproc.signals.run_up_spectra import mean_positions, run_up_spectra
+from postproc.signals.run_ups import mean_positions, run_up_spectra
 from rubhpc import LumpedStator, Rig, Unbalance
 from rubhpc.errors import InputError
 

@@ -12,12 +12,10 @@ import pytest
 from spoiling import SPOILED
 
 from postproc.mokhtar2017.claims.cases import FREEDOM, SIXTH_HARMONIC, CaseFailed
-from postproc.mokhtar2017.claims.claim import FAILS, HOLDS, REPORTED
-from postproc.mokhtar2017.claims.index import on_figure
-from postproc.mokhtar2017.claims.listing import HEAD, as_json, document_of, text
+from postproc.mokhtar2017.claims.claim import FAILS, HEAD, HOLDS, REPORTED, as_json, document_of, text
 from postproc.mokhtar2017.claims.loops import count_loops
 from postproc.mokhtar2017.claims.quantities import tilt
-from postproc.mokhtar2017.claims.table import CLAIMS
+from postproc.mokhtar2017.claims.table import CLAIMS, on_figure
 from rubhpc.errors import InputError, StoreError
 from rubhpc.schema import DIVERGED, MISSING
 

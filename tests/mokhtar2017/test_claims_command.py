@@ -13,8 +13,8 @@ import synthetic_paper
 from running import ROOT, run
 
 import rubhpc
+from postproc.mokhtar2017.claims.cases import open_studies
 from postproc.mokhtar2017.claims.claim import FAILS, REPORTED
-from postproc.mokhtar2017.claims.index import open_studies
 from postproc.mokhtar2017.claims.table import CLAIMS
 from postproc.mokhtar2017.figures.pages import FIGURES
 from rubhpc.rig.reading import read_rig

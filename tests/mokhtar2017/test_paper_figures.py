@@ -5,9 +5,8 @@ from __future__ import annotations
 import pytest
 from synthetic_paper import SAMPLES
 
-from postproc.figures.style import house_style
-from postproc.mokhtar2017.figures.index import draw_figures
-from postproc.mokhtar2017.figures.pages import FIGURES
+from postproc.figures.drawing import house_style
+from postproc.mokhtar2017.figures.pages import FIGURES, draw_figures
 from postproc.mokhtar2017.figures.panels import between_contacts
 from rubhpc.errors import InputError
 

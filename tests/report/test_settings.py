@@ -3,7 +3,7 @@
 import json
 from dataclasses import asdict
 
-from postproc.report.settings import setting_rows
+from postproc.report.facts import setting_rows
 from rubhpc.study.drive_keys import DriveKeys
 from rubhpc.study.tables import Integrator, Recording
 

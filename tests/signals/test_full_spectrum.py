@@ -10,8 +10,8 @@ import xarray as xr
 from postproc.figures.cascade import cascade as cascade_figure
 from postproc.figures.cascade import intensity, waterfall
 from postproc.figures.cascade_lines import draw_frequencies, draw_orders
+from postproc.figures.drawing import house_style, new_figure
 from postproc.figures.spectrum import spectrum as spectrum_figure
-from postproc.figures.style import house_style, new_figure
 from postproc.signals.cascade import below, cascade, hold_peaks
 from postproc.signals.spectra import WHIRL, full_spectrum, spectrum_data
 from postproc.store.select import select

@@ -10,8 +10,8 @@ import xarray as xr
 from click.testing import CliRunner
 
 from postproc.catalogue import figures
+from postproc.figures.drawing import house_style, new_figure
 from postproc.figures.hht import draw_panels, energy_time_frequency, hht
-from postproc.figures.style import house_style, new_figure
 from postproc.signals.hilbert_huang import (
     analytic,
     contact_bandwidth,

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from postproc.store.axes import source
+from postproc.store.open import open_store
 from postproc.store.select import select
 from rubhpc.errors import StoreError
 from rubhpc.schema import DONE, MISSING, STATUS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     import xarray as xr
 
@@ -52,6 +54,22 @@ class Cases:
         if (status != DONE).any():
             raise CaseFailed(f"a case has {STATUS[int(status.max())]}")
         return chosen
+
+
+def open_studies(folder: str | Path, names: Iterable[str]) -> dict[str, xr.Dataset]:
+    """Return the stores of some studies of `jobs/paper`, lazily, by the names of their files.
+
+    Raises
+    ------
+    StoreError
+        One is missing.
+    """
+    paths = {name: Path(folder) / f"{name}.zarr" for name in dict.fromkeys(names)}
+    missing = [path.name for path in paths.values() if not path.exists()]
+    if missing:
+        problem = f"there is no {', '.join(missing)}"
+        raise StoreError(f"{folder}: {problem}; run make paper, or give another folder with --stores")
+    return {name: open_store(path) for name, path in paths.items()}
 
 
 # r = 0.75

@@ -17,6 +17,7 @@ from postproc.mokhtar2017.claims.claim import Claim
 from postproc.mokhtar2017.claims.loops import loops_of
 from postproc.signals.contacts import contact_spans, free_decay, peak_after_contact
 from postproc.store.rig_of_case import natural_frequencies, stator_frequencies
+from rubhpc.errors import InputError
 
 _OTHER_RIG = "reported: the rig of this figure is not in the paper"
 _RESONANCE = "r {:.1f} ({:.1f} Hz), period {}, loops {}".format
@@ -602,3 +603,18 @@ CLAIMS: tuple[Claim, ...] = (
     ),
 )
 # fmt: on
+
+
+def on_figure(number: int) -> list[Claim]:
+    """Return the claims on one figure of the paper.
+
+    Raises
+    ------
+    InputError
+        None is.
+    """
+    found = [claim for claim in CLAIMS if number in claim.figures]
+    if not found:
+        known = sorted({n for claim in CLAIMS for n in claim.figures})
+        raise InputError(f"--figure {number}: no claim on it; there are {', '.join(map(str, known))}")
+    return found

@@ -1,26 +1,41 @@
-"""The figures of the paper, each with its number and the cases that it shows."""
+"""The figures of the paper, each with its number and the cases that it shows, and how they are drawn."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from postproc.figures.cascade import waterfall
 from postproc.figures.cascade_lines import draw_frequencies, draw_orders
+from postproc.figures.drawing import house_style
 from postproc.mokhtar2017.claims import cases
 from postproc.mokhtar2017.claims.quantities import (
     largest_orbit,
     spin_frequency,
     torsional_cascade,
 )
-from postproc.mokhtar2017.figures.cascade_marks import HEIGHT, ORDERS, mark_lines
-from postproc.mokhtar2017.figures.hilbert import energy, share_bar, windowed
-from postproc.mokhtar2017.figures.panels import closeup, legend, lines, orbits, over_time, page, title
+from postproc.mokhtar2017.figures.panels import (
+    HEIGHT,
+    ORDERS,
+    closeup,
+    energy,
+    legend,
+    lines,
+    mark_lines,
+    orbits,
+    over_time,
+    page,
+    share_bar,
+    title,
+    windowed,
+)
 from postproc.signals.contacts import contact_spans
 from postproc.store.rig_of_case import natural_frequencies
+from rubhpc.errors import writing
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
     import xarray as xr
     from matplotlib.figure import Figure
@@ -274,3 +289,23 @@ def cascade(every: xr.Dataset, first: xr.Dataset) -> Figure:
     mark_lines(ax, spectra, torsional, bending)
     ax.set_title("")
     return figure
+
+
+def draw_figures(
+    numbers: Iterable[int], stores: Mapping[str, xr.Dataset], folder: str | Path
+) -> Iterator[Path]:
+    """Draw figures into a folder, which is made, as figNN.png; yield their paths.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be made or written to.
+    """
+    folder = Path(folder)
+    with writing(folder, "--draw"):
+        folder.mkdir(parents=True, exist_ok=True)
+        for number in numbers:
+            path = folder / f"fig{number:02d}.png"
+            with house_style():
+                FIGURES[number].of(stores).savefig(path, dpi="figure", pil_kwargs={"optimize": True})
+            yield path
