@@ -164,6 +164,8 @@ def test_cells_meet_half_way_also_on_a_log_scale():
     assert cell_edges(np.array([1.0, 2.0, 4.5])) == pytest.approx([0.5, 1.5, 3.25, 5.75])
     assert cell_edges(np.array([1.0, 10.0, 100.0])) == pytest.approx(10 ** np.array([-0.5, 0.5, 1.5, 2.5]))
     assert cell_edges(np.array([0.3])) == pytest.approx([0.15, 0.45])
+    assert cell_edges(np.array([0.1, 0.4])) == pytest.approx([0.0, 0.25, 0.55])  # none below 0
+    assert cell_edges(np.array([0.0, 0.2])) == pytest.approx([-0.1, 0.1, 0.3])
 
 
 def test_hatched_cells_are_one_patch_of_their_area(ax):
