@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import errno
 import os
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
 _LOCKED = (
@@ -21,6 +23,16 @@ def reason_of(error: OSError, path: Path) -> str:
     if "unable to lock file" in str(error):
         return _LOCKED
     return _NO_INODES if lacks_inodes(error, path) else error.strerror or str(error)
+
+
+@contextmanager
+def writing(path: Path, option: str = "") -> Iterator[None]:
+    """Have a file or folder that cannot be written reported, with the option that names another one."""
+    try:
+        yield
+    except OSError as error:
+        remedy = f"choose another {option}".rstrip()
+        raise InputError(f"{path}: cannot be written: {reason_of(error, path)}; {remedy}") from error
 
 
 def lacks_inodes(error: OSError, path: Path) -> bool:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 import rubhpc
-from postproc.figures.style import COLUMN_WIDTH, house_style, save
+from postproc.figures.drawing import COLUMN_WIDTH, house_style, save
 from rubhpc.fem.annular import annular_rub
 
 PACKAGED = rubhpc.read_rig("mokhtar2017")

@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 import rubhpc
-from postproc.figures.style import COLUMN_WIDTH, house_style, save
+from postproc.figures.drawing import COLUMN_WIDTH, house_style, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

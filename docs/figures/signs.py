@@ -10,7 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyArrowPatch, Rectangle
 
-from postproc.figures.style import COLUMN_WIDTH, house_style, save
+from postproc.figures.drawing import COLUMN_WIDTH, house_style, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,4 +1,4 @@
-"""Sizes of basins: how many starts reach each motion, with intervals; basin entropy."""
+"""Of each motion that starts reach: how many do, with intervals, and an example; basin entropy."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy.special import entr
 
 from postproc.cases.attractors import NO_MOTION
-from rubhpc.schema import REGIME
+from rubhpc.schema import DONE, REGIME
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
 ENTROPY_BOX = 5  # starts along each side of the boxes of the basin entropy
+_PLANE = ("vertical", "horizontal")
 
 
 def fractions(attractor: xr.DataArray, starts: Sequence[str], store: xr.Dataset) -> xr.Dataset:
@@ -104,3 +105,51 @@ def name_of(regime: int, period: int) -> str:
     """Return what a motion is in words: "no contact", "P2", "chaotic"."""
     text = REGIME[regime].replace("quasi_periodic", "quasi-periodic").replace("_", " ")
     return f"P{period}" if text == "periodic" and period > 0 else text
+
+
+def examples(found: xr.DataArray, cases: xr.Dataset, starts: Sequence[str]) -> xr.Dataset:
+    """Return an example of each motion: the first start that reaches it, by the values of the starts.
+
+    Parameters
+    ----------
+    found : DataArray
+        From `attractors`.
+    cases : Dataset
+        Those cases, with sections, and waveforms if there are any.
+    starts : sequence of str
+        Dimensions over which starts differ.
+
+    Returns
+    -------
+    Dataset over (*settings, attractor)
+        `example_START`, the coordinates of the start (NaN where no case has the motion); over `section` also
+        `motion_section_vertical` and `..._horizontal`, m. Of one setting also `orbit_vertical` and
+        `orbit_horizontal` over `sample`, m, where waveforms are kept.
+    """
+    ordered = cases.sortby([d for d in starts if cases[d].dtype.kind in "fiu"])
+    number = found.reindex_like(ordered["status"]).where(ordered["status"] == DONE, NO_MOTION)
+    numbers = np.unique(number.values[number.values != NO_MOTION])
+    settings = [str(d) for d in number.dims if d not in starts]
+    flat = number.transpose(*settings, *starts).values.reshape(*(number.sizes[d] for d in settings), -1)
+    is_of = flat[..., np.newaxis, :] == numbers[:, np.newaxis]
+    dims, has_one = (*settings, "attractor"), is_of.any(axis=-1)
+    place = np.unravel_index(is_of.argmax(axis=-1), [number.sizes[d] for d in starts])
+    at = {d: xr.DataArray(i, dims=dims) for d, i in zip(starts, place, strict=True)}
+    at |= {d: xr.DataArray(np.arange(number.sizes[d]), dims=d) for d in settings}
+    is_there = xr.DataArray(has_one, dims=dims, coords={"attractor": numbers})
+    shown = xr.Dataset(coords={d: ordered[d] for d in settings} | {"attractor": numbers})
+    for name in (
+        str(n) for n, c in ordered.coords.items() if set(c.dims) & set(starts) and n not in settings
+    ):
+        values = ordered[name].astype(float).isel({d: at[str(d)] for d in ordered[name].dims})
+        shown[f"example_{name}"] = (dims, np.where(has_one, values.values, np.nan), ordered[name].attrs)
+    for name in _PLANE:
+        section = ordered[f"section_{name}"].load().isel(at).where(is_there)
+        shown[f"motion_section_{name}"] = ((*dims, "section"), section.transpose(*dims, "section").values)
+        shown[f"motion_section_{name}"].attrs = cases[f"section_{name}"].attrs
+        if name in cases and not settings:
+            orbits = [
+                ordered[name].isel({d: int(at[d][i]) for d in starts}).values for i in range(len(numbers))
+            ]
+            shown[f"orbit_{name}"] = (("attractor", "sample"), np.array(orbits), cases[name].attrs)
+    return shown

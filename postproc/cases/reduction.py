@@ -21,9 +21,8 @@ from postproc.cases.workers import computed as computed
 from postproc.signals.spectra import spectrum_of, with_frequency
 from postproc.store.axes import axes_of, find_axis, source
 from postproc.store.open import open_store
-from postproc.store.select import select
+from postproc.store.select import select, worst_of_stators
 from postproc.store.variables import LONG_ROLES, require_measure
-from postproc.store.worst import worst_of_stators
 from rubhpc.errors import InputError
 from rubhpc.input.array_files import CHECKED
 from rubhpc.schema import DONE, HAS_VALUES, role_of

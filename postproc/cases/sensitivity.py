@@ -1,10 +1,10 @@
 """Sobol indices of a measure over the axes of a study: which of them it depends on, and which act together.
 
-A grid is a full factorial, so nothing is estimated where all cases are done (`postproc.cases.factorial`):
+A grid is a full factorial, so nothing is estimated where all cases are done (`postproc.cases.sobol`):
 with every level of an axis weighing the same and axes independent, the decomposition of the variance (I. M.
 Sobol', Math. Modelling Comput. Exp. 1, 1993) is a matter of means along axes, exact on the levels that were
 computed. The intervals show the spread that other levels of the same range would give. The indices of a
-sampled study are estimates (`postproc.cases.saltelli`).
+sampled study are estimates (`postproc.cases.sobol`).
 """
 
 from __future__ import annotations
@@ -14,12 +14,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from postproc.cases.factorial import filled_in, grid_indices, half_widths
-from postproc.cases.saltelli import by_point, drawn_ranges, estimate
+from postproc.cases.sobol import by_point, drawn_ranges, estimate, filled_in, grid_indices, half_widths
 from postproc.store.axes import axes_of, drawn_axes, source
-from postproc.store.select import narrow, written_values
+from postproc.store.select import narrow, worst_of_stators, written_values
 from postproc.store.variables import require_measure
-from postproc.store.worst import worst_of_stators
 from rubhpc.errors import InputError
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING
 from rubhpc.study.sampling import CASE

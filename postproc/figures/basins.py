@@ -8,20 +8,23 @@ import numpy as np
 import xarray as xr
 
 from postproc.cases.attractors import NO_MOTION, attractors, start_axes
-from postproc.cases.basin_shares import basin_entropy, fractions
-from postproc.cases.motion_examples import examples
-from postproc.cases.saltelli import is_log
-from postproc.figures.basin_motions import draw_motions, draw_sections
-from postproc.figures.cells import cell_edges, hatch_cells, is_geometric
+from postproc.cases.basin_shares import basin_entropy, examples, fractions
+from postproc.cases.sobol import is_log
+from postproc.figures.basin_motions import (
+    colors_of,
+    described,
+    draw_motions,
+    draw_sections,
+    motion_label,
+    motion_name,
+)
+from postproc.figures.cells import cell_edges, hatch_cells, is_geometric, tick_levels
 from postproc.figures.drawing import Drawing
-from postproc.figures.motion_names import colors_of, described, motion_label, motion_name
 from postproc.figures.palette import NOT_DONE, NOT_SETTLED
 from postproc.figures.small_multiples import legend_below
-from postproc.figures.ticks import tick_levels
 from postproc.store.axes import axes_of, drawn_axes, find_axis, source
-from postproc.store.select import first_of_rest
+from postproc.store.select import first_of_rest, worst_of_stators
 from postproc.store.units import displayed, written_value
-from postproc.store.worst import worst_of_stators
 from rubhpc.errors import InputError
 from rubhpc.schema import DONE
 from rubhpc.study.sampling import CASE

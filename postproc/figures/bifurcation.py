@@ -7,19 +7,17 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from postproc.figures.branch_lines import draw_branches, name_branches
-from postproc.figures.cells import cell_edges, hatch_cells, is_geometric
+from postproc.figures.cells import cell_edges, hatch_cells, is_geometric, tick_levels
 from postproc.figures.drawing import Drawing
 from postproc.figures.palette import NOT_DONE, categories
-from postproc.figures.ticks import tick_levels
 from postproc.signals.sections import section_of, sections_along
 from postproc.store.axes import axes_of, find_axis, ordered_axes, source
 from postproc.store.branch_points import is_of_points, one_case
 from postproc.store.open import open_store
 from postproc.store.run_ups import is_run_up
-from postproc.store.select import first_of_rest, select
+from postproc.store.select import at_most_loaded_stator, first_of_rest, select
 from postproc.store.units import displayed, meanings, scale_of, short_name
 from postproc.store.variables import require_results, require_variables
-from postproc.store.worst import at_most_loaded_stator
 from rubhpc.errors import InputError
 from rubhpc.schema import HAS_VALUES, INFERRED
 from rubhpc.study.axes import DIRECTION, DIRECTIONS

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from postproc.figures.cells import degree_steps
 from postproc.figures.drawing import Drawing
-from postproc.figures.overlay import overlaid
 from postproc.figures.run_up_marks import RPM, critical_speeds, falling, written_speeds
-from postproc.figures.ticks import degree_steps
+from postproc.figures.small_multiples import overlaid
 from postproc.signals.orders import order_over_speed, written_lag
 from postproc.signals.spectra import default_signal
 from postproc.store.run_ups import is_run_up
@@ -69,8 +70,7 @@ def bode(
         require_results(shown[f"amplitude_{name}"], cases)
     _require_one_unit(shown, signals)
 
-    speeds = shown["speed"].values
-    critical = critical_speeds(cases, float(np.nanmin(speeds)), float(np.nanmax(speeds)))
+    critical = critical_speeds(cases, shown["speed"])
 
     def draw(axes: list[Axes]) -> None:
         draw_bode(shown, signals, axes, order, critical)
@@ -111,10 +111,10 @@ def draw_bode(
     peaks: list[tuple[ResponsePeak, Line2D, bool]] = []
     for i_signal, name in enumerate(signals):
         amplitude, phase = data[f"amplitude_{name}"], data[f"phase_{name}"]
-        curves = zip(overlaid(amplitude, along), overlaid(phase, along), strict=True)
+        touch = data.get("contact_fraction", 0.0 * speeds)
         before: tuple[Floats, Floats] | None = None
-        for i_case, ((case, height), (_, lead)) in enumerate(curves):
-            own_speeds = speeds.isel({over: i_case}) if over in speeds.dims else speeds
+        curves = overlaid(along, amplitude, phase, speeds, touch.fillna(0.0))
+        for i_case, (case, height, lead, own_speeds, touches) in enumerate(curves):
             rpm = own_speeds.values * RPM
             own = name.removeprefix("probe_").replace("_", " ") if len(signals) > 1 else None
             label = ", ".join(text for text in (own, case) if text) or None
@@ -130,15 +130,12 @@ def draw_bode(
                 top.plot(rpm, np.where(back, size, np.nan), **faint)
                 bottom.plot(rpm, np.where(back, lag, np.nan), **faint)
                 has_fallen = True
-            touch = np.zeros(rpm.size)
-            if "contact_fraction" in data:
-                contact = data["contact_fraction"]
-                touch = np.nan_to_num(contact.isel({over: i_case} if over in contact.dims else {}).values)
             for way in (~back, back) if order == 1.0 else ():
                 at = own_speeds.values[way]
                 for peak in peaks_of(at, size[way], lag[way], is_swept):
                     low, high = peak.half_power_speeds
-                    peaks.append((peak, curve, bool((touch[way][(at >= low) & (at <= high)] > 0.0).any())))
+                    rubs = touches.values[way][(at >= low) & (at <= high)] > 0.0
+                    peaks.append((peak, curve, bool(rubs.any())))
     shown = [signal_name(data[f"amplitude_{signals[0]}"])] if len(signals) == 1 else []
     top.set_title(", ".join([*shown, written_order(order)]), fontsize=8)
     top.set(ylabel=scale.label("Amplitude, 0\N{EN DASH}peak"), xlim=ends)
@@ -231,7 +228,5 @@ def signal_name(amplitude: xr.DataArray) -> str:
 
 def written_order(order: float) -> str:
     """An order as engineers write it: 1X, 1/2X, 2X."""
-    for part in range(1, 9):
-        if abs(order * part - round(order * part)) < 1e-3:
-            return f"{round(order * part)}{'' if part == 1 else f'/{part}'}X"
-    return f"{order:.3g}X"
+    near = Fraction(order).limit_denominator(8)
+    return f"{near}X" if abs(order - near) * near.denominator < 1e-3 else f"{order:.3g}X"

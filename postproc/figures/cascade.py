@@ -7,11 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 
-from postproc.figures.cascade_lines import draw_frequencies, draw_orders, name_senses, ordinate
-from postproc.figures.cells import cell_edges, is_geometric
+from postproc.figures.cascade_lines import (
+    ABSCISSA_LABELS,
+    draw_frequencies,
+    draw_orders,
+    name_senses,
+    ordinate,
+)
+from postproc.figures.cells import cell_edges, is_geometric, tick_levels
 from postproc.figures.drawing import Drawing
 from postproc.figures.options import end_of_abscissa, hertz
-from postproc.figures.ticks import tick_levels
 from postproc.signals.cascade import below, default_axis, hold_peaks, hold_rows
 from postproc.signals.cascade import cascade as cascade_data
 from postproc.signals.lines import SPIKE, parse_orders, spikes
@@ -35,7 +40,6 @@ _PIXELS = (800, 500)  # of an intensity picture at column width and 300 dpi
 _DECADES = 3.0
 _MOST_ORDER = 5.0  # of the abscissa over orders, by default
 _NAMES_HIGH = 0.07  # of the rows' span, above the highest line, for the names of orders
-_NAMES = {"frequency": "Frequency (Hz)", "order": "Order (multiples of spin speed)"}
 
 
 def cascade(
@@ -142,7 +146,7 @@ def waterfall(
         order = 3 + (rows.max() - rows[i]) / span
         ax.fill_between(at, rows[i], rows[i] + line, color="white", linewidth=0, zorder=order)
         ax.plot(at, rows[i] + line, color="C0", linewidth=0.5, zorder=order)
-    ax.set(xlim=(_start(spectra, limit), limit), xlabel=_NAMES[abscissa], ylabel=label)
+    ax.set(xlim=(_start(spectra, limit), limit), xlabel=ABSCISSA_LABELS[abscissa], ylabel=label)
     below_rows = 0.1 if _start(spectra, limit) < 0 else 0.04  # room for the senses of whirl
     ax.set_ylim(rows.min() - below_rows * span, rows.max() + (height + 0.02 + _NAMES_HIGH) * span)
     ax.set_yticks([t for t in ax.get_yticks() if abs(t - rows.mean()) <= 0.55 * span])
@@ -182,7 +186,7 @@ def intensity(spectra: xr.DataArray, ax: Axes, limit: float, abscissa: str = "fr
         rasterized=True,
     )
     ax.set_facecolor("0.85")  # shows where a case is missing
-    ax.set(xlim=(_start(spectra, limit), limit), xlabel=_NAMES[abscissa], ylabel=label)
+    ax.set(xlim=(_start(spectra, limit), limit), xlabel=ABSCISSA_LABELS[abscissa], ylabel=label)
     _name_decades(ax, held)
     tick_levels(ax, "y", held[held.dims[0]], rows)
     name_senses(ax, "0.9")

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
+ABSCISSA_LABELS = {"frequency": "Frequency (Hz)", "order": "Order (multiples of spin speed)"}
 ORDERS = tuple(Fraction(*f) for f in ((1, 3), (1, 2), (2, 3), (1, 1), (3, 2), (2, 1), (3, 1)))
 _CHARACTER = 0.018  # of the axes, for a letter of a name
 _CORNER = 0.24  # of the ordinate, above which the bar that shows the size of spectra may be

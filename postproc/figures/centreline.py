@@ -9,7 +9,7 @@ import numpy as np
 from postproc.figures.drawing import Drawing
 from postproc.figures.run_up_marks import APART, draw_rotation, name_speeds
 from postproc.signals.places import moved_at
-from postproc.signals.run_up_spectra import mean_positions
+from postproc.signals.run_ups import mean_positions
 from postproc.store.attributes import MEASURED
 from postproc.store.rig_of_case import stator_places, stators_around
 from rubhpc.units import scale_for

@@ -10,6 +10,7 @@ import numpy as np
 
 from postproc.figures.drawing import Drawing
 from postproc.figures.options import end_of_abscissa
+from postproc.signals.contacts import runs_of
 from postproc.signals.hilbert_huang import (
     contact_bandwidth,
     energy_picture,
@@ -20,8 +21,8 @@ from postproc.signals.hilbert_huang import (
 from postproc.signals.spectra import default_signal
 from postproc.store.attributes import MEASURED
 from postproc.store.rig_of_case import natural_frequencies, stator_frequencies
+from postproc.store.select import at_most_loaded_stator
 from postproc.store.units import plain_number, scale_of, short_name
-from postproc.store.worst import at_most_loaded_stator
 from rubhpc.errors import InputError
 from rubhpc.units import scale_for
 
@@ -186,9 +187,8 @@ def _draw_energy(
 
 def _shade(hht: xr.Dataset, ax: Axes, factor: float) -> None:
     time = hht["time"].values
-    ends = np.diff(np.pad(hht["contact"].values.astype(np.int8), 1))
     dt = time[1] - time[0]
-    for first, end in zip(np.flatnonzero(ends == 1), np.flatnonzero(ends == -1), strict=True):
+    for first, end in zip(*runs_of(hht["contact"].values), strict=True):
         ax.axvspan(first * dt * factor, end * dt * factor, color=_SHADE, linewidth=0, zorder=0)
 
 

@@ -8,18 +8,16 @@ import numpy as np
 
 from postproc.cases.maps import default_axes, facet_axes, map_data, out_of_range, scatter_axes
 from postproc.figures.branch_lines import events_at, mark_over_map
-from postproc.figures.cells import cell_edges, hatch_cells, is_geometric, outline_cells
+from postproc.figures.cells import cell_edges, hatch_cells, is_geometric, outline_cells, tick_levels
 from postproc.figures.drawing import Drawing
 from postproc.figures.palette import CATEGORIES, NOT_DONE, NOT_SETTLED, WARNING, coloured, paint_of
 from postproc.figures.scatter import scatter_maps
 from postproc.figures.small_multiples import color_bar, legend_below, name_facets, write_over
-from postproc.figures.ticks import tick_levels
 from postproc.store.axes import drawn_axes, source
 from postproc.store.open import open_store
-from postproc.store.select import first_of_rest
+from postproc.store.select import first_of_rest, worst_of_stators
 from postproc.store.units import displayed
 from postproc.store.variables import require_variables
-from postproc.store.worst import worst_of_stators
 from rubhpc.errors import InputError
 from rubhpc.schema import HAS_VALUES, INFERRED, MISSING
 from rubhpc.study.sampling import CASE

@@ -9,9 +9,8 @@ import numpy as np
 
 from postproc.figures.drawing import Drawing
 from postproc.figures.options import spin_speed
-from postproc.figures.overlay import overlaid
 from postproc.figures.run_up_marks import draw_rotation, title_of_speeds
-from postproc.figures.small_multiples import legend_below
+from postproc.figures.small_multiples import legend_below, overlaid
 from postproc.signals.places import moved_at
 from postproc.signals.spectra import samples_per_revolution
 from postproc.signals.waveforms import orbit_data
@@ -109,8 +108,7 @@ def draw_orbit(data: xr.Dataset, ax: Axes, frame: str = "orbit") -> Axes:
         if is_mean or not is_seen:
             title.append(f"mean {_written(mean[1], scale)} vertical, {_written(mean[0], scale)} horizontal")
     else:
-        curves = zip(overlaid(vertical, "sample"), overlaid(horizontal, "sample"), strict=True)
-        for (name, y), (_, z) in curves:
+        for name, y, z in overlaid("sample", vertical, horizontal):
             ax.plot(z.values * scale.factor, y.values * scale.factor, linewidth=0.5, label=name)
     if title:
         ax.set_title("; ".join(title), fontsize=7)

@@ -8,8 +8,8 @@ import numpy as np
 
 from postproc.figures.bode import signal_name, written_order
 from postproc.figures.drawing import Drawing
-from postproc.figures.overlay import overlaid
 from postproc.figures.run_up_marks import critical_speeds, draw_rotation, name_speeds, written_speeds
+from postproc.figures.small_multiples import overlaid
 from postproc.signals.orders import order_over_speed
 from postproc.signals.spectra import default_signal
 from postproc.store.run_ups import is_run_up
@@ -53,8 +53,7 @@ def polar(
     if not shown[f"phase_{signal}"].notnull().any():
         problem = f"{written_order(order)} is none, or lost in other motion, and has no phase"
         raise InputError(f"{signal}: {problem}; draw its amplitude with rubhpc bode")
-    speeds = shown["speed"].values
-    critical = critical_speeds(cases, float(np.nanmin(speeds)), float(np.nanmax(speeds)))
+    critical = critical_speeds(cases, shown["speed"])
     angle = _seen_from(cases, signal)
     return Drawing(
         shown=shown,
@@ -77,11 +76,8 @@ def draw_polar(
     scale = scale_for(str(amplitude.attrs.get("units", "1")), float(np.nanmax(amplitude.values)))
     reach = 1.12 * float(np.nanmax(amplitude.values)) * scale.factor or 1.0
     _draw_grid(ax, reach, angle, _emptiest(amplitude.values, phase.values))
-    over = next((dim for dim in amplitude.dims if dim != along), None)
-    pairs = zip(overlaid(amplitude, along), overlaid(phase, along), strict=True)
     curves, n_curve = [], 0
-    for i_case, ((case, height), (_, lead)) in enumerate(pairs):
-        own = speeds.isel({over: i_case}) if over in speeds.dims else speeds
+    for case, height, lead, own in overlaid(along, amplitude, phase, speeds):
         # Drawn as seen from the drive end: clockwise is the sense of spin, and a lead turns with it.
         turned = angle + lead.values
         x, y = (

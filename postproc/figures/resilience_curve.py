@@ -42,7 +42,8 @@ def resilience(knocks: xr.Dataset) -> Drawing:
     others = [d for d in several if d != along]
     single = {d: 0 for d in knocks.least_impulse.dims if d != along and d not in others}
     shown = knocks.isel(single).sortby(along)
-    lines = [shown] if not others else [part for _, part in _parts(shown, others)]
+    places = np.ndindex(*(shown.sizes[d] for d in others))
+    lines = [shown.isel(dict(zip(others, place, strict=True))) for place in places]
     if len(lines) > _MOST_LINES:
         raise InputError(
             f"{len(lines)} curves are more than {_MOST_LINES}; leave some values of {others[0]} out"
@@ -118,12 +119,6 @@ def _point_up(ax: Axes, x: NDArray[np.float64], color: str, number: int, label: 
         transform=ax.get_xaxis_transform(),
         label=label,
     )
-
-
-def _parts(shown: xr.Dataset, others: list[str]) -> list[tuple[object, xr.Dataset]]:
-    """The curves, one for each combination of values on the other axes."""
-    places = list(np.ndindex(*(shown.sizes[d] for d in others)))
-    return [(place, shown.isel(dict(zip(others, place, strict=True)))) for place in places]
 
 
 def _mark(ax: Axes, x: NDArray[np.float64], lines: list[xr.Dataset]) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from postproc.cases.maps import out_of_range
-from postproc.cases.saltelli import is_log
+from postproc.cases.sobol import is_log
 from postproc.figures.palette import CATEGORIES, NOT_DONE, NOT_SETTLED, WARNING, coloured, paint_of
 from postproc.figures.small_multiples import color_bar, legend_below, name_facets, write_over
 from postproc.store.units import displayed

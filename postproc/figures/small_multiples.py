@@ -1,4 +1,4 @@
-"""Panels of small multiples: their titles and labels, and the colour bar and legend that they share."""
+"""Several cases in one figure: over one another, or in panels with titles, a colour bar and a legend."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from postproc.store.units import written_value
+from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,6 +26,32 @@ _DISTINCT = 5  # names of a scale that are always written: periods up to 4 have 
 _MOST_NAMES = 16  # that fit next to a scale
 _COLUMN = 3.46  # inches, width of a figure of one column
 _LEGEND_WIDTH = 64  # characters that fit a column of a page, 6 of them taken by each handle
+MOST = 7  # curves that have a colour of their own
+
+
+def overlaid(own: str, *data: xr.DataArray) -> list[tuple[Any, ...]]:
+    """Return the cases to draw over one another: its name for a legend, of one case None, and its data.
+
+    `own` is the dimension of a curve; another of the first data, if there is one, is the axis of the study to
+    spread over.
+
+    Raises
+    ------
+    InputError
+        There are more curves than can be distinguished.
+    """
+    first = data[0]
+    over = next((d for d in first.dims if d != own), None)
+    if over is None:
+        return [(None, *data)]
+    n_curve = first.sizes[over]
+    if n_curve > MOST:
+        hint = f"keep at most {MOST}, as in --select {over}=VALUE,VALUE"
+        raise InputError(f"{over}: {n_curve} curves over one another cannot be distinguished; {hint}")
+    return [
+        (written_value(first[over][i]), *(one.isel({over: i}) if over in one.dims else one for one in data))
+        for i in range(n_curve)
+    ]
 
 
 def color_bar(axes: Sequence[Axes], mesh: Any, paint: Paint) -> Colorbar:

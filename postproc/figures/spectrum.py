@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from postproc.figures.cascade_lines import name_senses
+from postproc.figures.cascade_lines import ABSCISSA_LABELS, name_senses
 from postproc.figures.drawing import Drawing
 from postproc.figures.options import end_of_abscissa, spin_speed
-from postproc.figures.overlay import overlaid
-from postproc.figures.small_multiples import write_over
+from postproc.figures.small_multiples import overlaid, write_over
 from postproc.signals.lines import SPIKE, spikes, strongest_lines
 from postproc.signals.places import signal_or_whirl
-from postproc.signals.run_up_spectra import run_up_spectra
+from postproc.signals.run_ups import run_up_spectra
 from postproc.signals.spectra import spectrum_data
 from postproc.store.attributes import MEASURED
 from postproc.store.rig_of_case import frequencies_at_speed
+from postproc.store.select import narrow
 from postproc.store.units import scale_of, short_name
 from postproc.store.variables import require_results
 
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 _LABEL_WIDTH = 38  # characters that fit next to a panel
 _WINDOW = 32  # revolutions in a spectrum of a run-up
 _FLOOR = 1e-5  # of the highest line, on a log scale
-_NAMES = {"frequency": "Frequency (Hz)", "order": "Order (multiples of spin speed)"}
 
 
 def spectrum(
@@ -87,7 +86,7 @@ def spectrum(
     cases, name = signal_or_whirl(cases, signal, "torsion", full, probes, node, stator)
     if at is None:
         shown = spectrum_data(cases, name, over).compute()
-        speed = float(cases["spin_speed"]) if over is None else None
+        speed = float(narrow(cases, ["spin_speed"])["spin_speed"]) if over is None else None
     else:
         speed = spin_speed(at, "--at")
         one = run_up_spectra(cases, name, _WINDOW, 1, speed).isel(place=0)
@@ -132,7 +131,7 @@ def draw_spectrum(
     amplitude = amplitude.where(is_line)
     scale = scale_of(amplitude)
     end = float(np.nanmax(amplitude[abscissa].values)) if limit is None else limit
-    for name, curve in overlaid(amplitude, "order"):
+    for name, curve in overlaid("order", amplitude):
         ax.plot(
             *spikes(curve[abscissa].values, curve.fillna(0.0).values * scale.factor, SPIKE * end),
             label=name,
@@ -152,7 +151,7 @@ def draw_spectrum(
         _name_lines(ax, lines, scale.factor, abscissa)
     if amplitude.ndim > 1:
         ax.legend(loc="upper right")
-    ax.set_xlabel(_NAMES[abscissa])
+    ax.set_xlabel(ABSCISSA_LABELS[abscissa])
     ax.set_ylabel(fill(scale.label(f"{short_name(amplitude)} amplitude"), _LABEL_WIDTH))
     name_senses(ax, is_above=True)
     return ax
@@ -161,7 +160,7 @@ def draw_spectrum(
 def default_limit(amplitude: xr.DataArray, abscissa: str = "frequency") -> float:
     """Return the default end of the abscissa: beyond the strongest lines, and not before 4X."""
     ends: list[float] = []
-    for _, curve in overlaid(amplitude, "order"):
+    for _, curve in overlaid("order", amplitude):
         first = float(curve[abscissa].values[-1] / curve["order"].values[-1])  # 1X
         lines = strongest_lines(curve)[abscissa].values
         least = 2.2 if curve["order"].values[0] < 0 else 4.2

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from postproc.figures.drawing import Drawing
-from postproc.figures.overlay import overlaid
 from postproc.figures.run_up_marks import RPM, critical_speeds
-from postproc.signals.spin import spin_over_time
+from postproc.figures.small_multiples import overlaid
+from postproc.signals.run_ups import spin_over_time
 from postproc.store.variables import require_results
 from rubhpc.units import scale_for
 
@@ -39,8 +39,7 @@ def speed(cases: xr.Dataset, *, over: Axis | None = None) -> Drawing:
     """
     shown = spin_over_time(cases, over)
     require_results(shown["speed"], cases)
-    speeds = shown["speed"].values
-    critical = critical_speeds(cases, float(np.nanmin(speeds)), float(np.nanmax(speeds)))
+    critical = critical_speeds(cases, shown["speed"])
     is_driven = "driving_torque" in shown
 
     def draw(axes: list[Axes]) -> None:
@@ -54,16 +53,16 @@ def speed(cases: xr.Dataset, *, over: Axis | None = None) -> Drawing:
 def draw_speed(data: xr.Dataset, axes: list[Axes], critical: Sequence[float] = ()) -> None:
     """Draw the speed, with critical speeds (rad/s), and below it the torques, where there are any."""
     top, bottom = axes[0], axes[-1]
-    times = [case.values for _, case in overlaid(data["time"], "revolution")]
-    for time, (name, speeds) in zip(times, overlaid(data["speed"], "revolution"), strict=True):
-        top.plot(time, RPM * speeds.values, label=name)
+    curves = overlaid("revolution", data["speed"], data["time"])
+    for name, speeds, time in curves:
+        top.plot(time.values, RPM * speeds.values, label=name)
     top.set(ylabel="Spin speed (rpm)", xlim=(0.0, float(np.nanmax(data["time"].values))))
     top.ticklabel_format(axis="y", style="plain", useOffset=False)
-    if len(times) > 1:
+    if len(curves) > 1:
         top.legend(loc="best", fontsize=6)
     _draw_critical(top, RPM * np.array(sorted(critical)))
     if "driving_torque" in data:
-        _draw_torques(data, times, bottom)
+        _draw_torques(data, bottom)
     bottom.set_xlabel("Time (s)")
     top.figure.align_ylabels(axes)
 
@@ -94,19 +93,13 @@ def _draw_critical(ax: Axes, speeds: NDArray[np.float64]) -> None:
         )
 
 
-def _draw_torques(data: xr.Dataset, times: Sequence[NDArray[np.float64]], ax: Axes) -> None:
+def _draw_torques(data: xr.Dataset, ax: Axes) -> None:
     """Draw what brakes the spin, and dashed what drives it."""
     from matplotlib.lines import Line2D
 
-    sizes = [float(np.nanmax(np.abs(data[name].values))) for name in ("driving_torque", "braking_torque")]
-    scale = scale_for("N m", max(sizes))
-    curves = zip(
-        times,
-        overlaid(data["driving_torque"], "revolution"),
-        overlaid(data["braking_torque"], "revolution"),
-        strict=True,
-    )
-    for i, (time, (_, drive), (_, brake)) in enumerate(curves):
+    drawn = [data[name] for name in ("driving_torque", "braking_torque", "time")]
+    scale = scale_for("N m", max(float(np.nanmax(np.abs(torque.values))) for torque in drawn[:2]))
+    for i, (_, drive, brake, time) in enumerate(overlaid("revolution", *drawn)):
         ax.plot(time, brake.values * scale.factor, color=f"C{i}", linewidth=0.8)
         ax.plot(time, drive.values * scale.factor, color=f"C{i}", linewidth=0.8, linestyle=(0, (4, 2)))
     ax.set_ylabel(scale.label("Torque"))

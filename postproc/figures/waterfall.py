@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from postproc.figures.cascade_lines import name_senses
+from postproc.figures.cascade_lines import ABSCISSA_LABELS, name_senses
 from postproc.figures.drawing import Drawing
 from postproc.figures.options import end_of_abscissa
 from postproc.figures.run_up_marks import RPM, falling
 from postproc.signals.places import signal_or_whirl
-from postproc.signals.run_up_spectra import run_up_spectra
+from postproc.signals.run_ups import run_up_spectra
 from postproc.store.units import plain_number, scale_of, short_name
 
 if TYPE_CHECKING:
@@ -106,7 +107,7 @@ def draw_waterfall(
     _draw_orders(ax, orders, None if at is rpm else (rpm, at))
     scale = scale_of(data["amplitude"])
     _bar(ax, _HEIGHT * span, f"{plain_number(top * scale.factor, 3)} {scale.unit}")
-    ax.set(xlabel=_abscissa(orders), ylabel=label)
+    ax.set(xlabel=ABSCISSA_LABELS["order" if orders else "frequency"], ylabel=label)
     ax.ticklabel_format(axis="y", style="plain", useOffset=False)
     ax.set_title(_title(data, signal), fontsize=8, pad=12)
     name_senses(ax)
@@ -154,7 +155,7 @@ def draw_spectrogram(
             style: dict[str, Any] = {"xytext": (2, 0), "ha": "left", "va": "center", "fontsize": 6}
             ax.annotate(_named(line), (at[-1], height[-1]), textcoords="offset points", **style)
     ax.figure.colorbar(mesh, ax=ax, label=scale.label(_title(data, signal)), pad=0.08 if start else 0.06)
-    ax.set(xlabel=label, ylabel=_abscissa(orders))
+    ax.set(xlabel=label, ylabel=ABSCISSA_LABELS["order" if orders else "frequency"])
     if start:
         for y, side, place in ((0.02, "backward", "bottom"), (0.98, "forward", "top")):
             ax.text(0.02, y, side, color="white", va=place, transform=ax.transAxes)
@@ -217,10 +218,5 @@ def _bar(ax: Axes, height: float, text: str) -> None:
     )
 
 
-def _abscissa(orders: bool) -> str:
-    return "Order (multiples of spin speed)" if orders else "Frequency (Hz)"
-
-
 def _named(order: float) -> str:
-    text = "1/2X" if abs(order) == 0.5 else f"{abs(order):.0f}X"
-    return f"\N{MINUS SIGN}{text}" if order < 0.0 else text
+    return f"{Fraction(order)}X".replace("-", "\N{MINUS SIGN}")

@@ -6,20 +6,17 @@ import re
 from textwrap import fill
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from postproc.figures.drawing import Drawing
 from postproc.figures.options import spin_speed
-from postproc.figures.overlay import overlaid
 from postproc.figures.run_up_marks import title_of_speeds
-from postproc.figures.small_multiples import legend_below
+from postproc.figures.small_multiples import legend_below, overlaid
+from postproc.signals.contacts import runs_of
 from postproc.signals.waveforms import default_signals, waveform_data
 from postproc.store.units import displayed, scale_of, short_name
 from postproc.store.variables import require_results
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from re import Match
 
     import xarray as xr
     from matplotlib.axes import Axes
@@ -71,7 +68,7 @@ def draw_waveform(signal: xr.DataArray, ax: Axes) -> Axes:
     x, x_label = displayed(abscissa)
     if abscissa.name == "revolution" and x[0] < 0.0:
         x_label = str(abscissa.attrs["long_name"]).capitalize()
-    for name, curve in overlaid(signal, "sample"):
+    for name, curve in overlaid("sample", signal):
         ax.plot(x, curve.values * scale.factor, label=name)
     ax.set(xlim=(x[0], x[-1]), xlabel=x_label, ylabel=scale.label(short_name(signal)))
     if signal.name == "contact_force" and not signal.any():  # a force has no negative part
@@ -84,7 +81,8 @@ def draw_panels(data: xr.Dataset, axes: Sequence[Axes]) -> list[Axes]:
     signals = [str(n) for n, v in data.data_vars.items() if "sample" in v.dims]
     for ax, name in zip(axes, signals, strict=True):
         draw_waveform(data[name], ax)
-        ax.set_ylabel(fill(_UNIT.sub(_unbroken, ax.get_ylabel()), _LABEL_WIDTH), fontsize=7)
+        label = _UNIT.sub(lambda unit: unit[0].replace(" ", "\N{NO-BREAK SPACE}"), ax.get_ylabel())
+        ax.set_ylabel(fill(label, _LABEL_WIDTH), fontsize=7)
         ax.label_outer()
         ax.locator_params(axis="y", nbins=4)
         ax.locator_params(axis="x", nbins=5)
@@ -100,14 +98,9 @@ def draw_panels(data: xr.Dataset, axes: Sequence[Axes]) -> list[Axes]:
 def shade_contacts(force: xr.DataArray, ax: Axes) -> None:
     """Shade the spans of contact behind a waveform, by the force of one stator."""
     x, _ = displayed(_abscissa(force))
-    touching = np.diff(np.pad((force.values > 0).astype(int), 1))
     half = (x[1] - x[0]) / 2  # a sample is a mean over its interval
-    for first, last in zip(np.flatnonzero(touching == 1), np.flatnonzero(touching == -1) - 1, strict=True):
-        ax.axvspan(x[first] - half, x[last] + half, color="0.9", linewidth=0, zorder=0)
-
-
-def _unbroken(unit: Match[str]) -> str:
-    return unit[0].replace(" ", "\N{NO-BREAK SPACE}")
+    for first, end in zip(*runs_of(force.values > 0), strict=True):
+        ax.axvspan(x[first] - half, x[end - 1] + half, color="0.9", linewidth=0, zorder=0)
 
 
 def _abscissa(signal: xr.DataArray) -> xr.DataArray:

@@ -7,10 +7,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from postproc.report.cases import spread
-from postproc.report.detail import LEVELS
-from postproc.report.packing import pack_floats
+from postproc.report.packing import LEVELS, pack_floats
 from postproc.report.page import Page, least_size, text_size
-from rubhpc.errors import InputError, reason_of
+from rubhpc.errors import InputError, writing
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from postproc.report.cases import Cases
-    from postproc.report.detail import Detail
+    from postproc.report.packing import Detail
 
 _NEEDED = ("status", "validity")  # without which a page shows nothing
 _SHARE_OF_MEASURES = 0.5  # of the room for data, at most
@@ -52,10 +51,8 @@ def write_report(store: xr.Dataset, path: Path, limit: float) -> Load:
     room -= _load_measures(page, load, room, limit)
     _load_records(page, load, room)
     text = page.html(load.values, load.records, load.notes)
-    try:
+    with writing(path):
         path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {reason_of(error, path)}; choose another") from error
     return load
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from postproc.report.detail import pack_case
+from postproc.report.packing import pack_case
 from postproc.store.attributes import table_of
 from postproc.store.axes import axes_of
 from postproc.store.rig_of_case import stator_places
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-    from postproc.report.detail import Detail
+    from postproc.report.packing import Detail
 
 _READ_AT_ONCE = 64_000_000  # bytes
 _SPARSE = 16  # cases read for each that is asked for, beyond which they are read one by one

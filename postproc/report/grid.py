@@ -14,8 +14,8 @@ from postproc.figures.palette import categories
 from postproc.store.attributes import table_of
 from postproc.store.axes import axes_of, drawn_axes
 from postproc.store.rig_of_case import unused_monitors
+from postproc.store.select import worst_word
 from postproc.store.units import displayed, meanings, short_name
-from postproc.store.worst import worst_word
 from rubhpc.errors import RubError
 from rubhpc.schema import DIVERGED, HAS_VALUES, PROBE, SIGNAL_NAMES, VARIABLES
 from rubhpc.units import Scale, scale_for

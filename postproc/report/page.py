@@ -11,9 +11,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from postproc.report.branches import branch_facts
 from postproc.report.cases import Cases
-from postproc.report.end_view import end_view
 from postproc.report.facts import (
     axis_rows,
     counts,
@@ -25,10 +23,9 @@ from postproc.report.facts import (
     validity_rows,
 )
 from postproc.report.grid import Measures, described_axes, validity_text
-from postproc.report.linear_design import design_facts
 from postproc.report.packing import as_text
-from postproc.report.run_ups import run_up_facts
-from postproc.report.side_view import description, side_view
+from postproc.report.pictures import branch_facts, design_facts, run_up_facts
+from postproc.report.rig_views import description, end_view, side_view
 from postproc.store.attributes import table_of
 from postproc.store.axes import source
 from postproc.store.branch_points import check_points

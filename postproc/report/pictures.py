@@ -1,17 +1,40 @@
-"""Figures as pictures within the page."""
+"""Facts with pictures on the page: linear design, branches of periodic motions, run-ups and driven rotors."""
 
 from __future__ import annotations
 
 import base64
 import io
-from typing import TYPE_CHECKING
+import json
+import math
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
-from postproc.figures.style import house_style, new_figure
+import numpy as np
+
+from postproc.figures.bifurcation import bifurcation
+from postproc.figures.bode import bode
+from postproc.figures.drawing import house_style, new_figure
+from postproc.figures.linear_design import campbell_diagram
+from postproc.figures.multipliers import multipliers
+from postproc.figures.speed import speed
+from postproc.figures.waterfall import waterfall
+from postproc.store.axes import axes_of
+from postproc.store.branch_points import followed, is_of_points, other_axes
+from postproc.store.rig_of_case import rig_of
+from postproc.store.run_ups import is_run_up
+from postproc.store.units import displayed, written_value
+from rubhpc.errors import RubError
+from rubhpc.rig.reading import rig_from_dict
+from rubhpc.schema import AMPLITUDE, DONE, PROBE
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from postproc.figures.drawing import Drawing
 
 MOST_DRAWN = 6  # cases: a picture takes 50 kB
+_FEWEST, _WINDOW = 4, 32  # revolutions: of a Bode plot, of a spectrum
+_RPM = 30 / math.pi
 
 
 def picture(drawing: Drawing, *, is_shared: bool = False) -> str:
@@ -23,3 +46,138 @@ def picture(drawing: Drawing, *, is_shared: bool = False) -> str:
         drawing.draw(axes)
         figure.savefig(content, format="png", dpi=110)
     return "data:image/png;base64," + base64.b64encode(content.getvalue()).decode()
+
+
+def branch_facts(store: xr.Dataset) -> dict[str, Any]:
+    """Return what the page shows of branches.
+
+    Returns
+    -------
+    dict
+        `text`: how many points and branches there are, "" where the store has none; `cases`: of the first
+        cases `label`, the values of their axes, and `diagram` and `multipliers`, addresses that contain
+        pictures.
+    """
+    if not is_of_points(store) or not store.sizes["point"]:
+        return {"text": "", "cases": []}
+    varied = [name for name in other_axes(store) if np.unique(store[name].values).size > 1]
+    settings = np.unique(np.array([store[name].values for name in varied]).T, axis=0) if varied else [()]
+    cases = []
+    for setting in settings[:MOST_DRAWN]:
+        is_one = np.ones(store.sizes["point"], dtype=bool)
+        for name, value in zip(varied, setting, strict=True):
+            is_one &= store[name].values == value
+        points = store.isel(point=np.flatnonzero(is_one))
+        shown = [displayed(points[name].isel(point=0)) for name in varied]
+        cases.append(
+            {
+                "label": ", ".join(f"{label.replace('$', '')} {float(value):.6g}" for value, label in shown),
+                "diagram": picture(bifurcation(points)),
+                "multipliers": picture(multipliers(points)),
+            }
+        )
+    number = len(settings)
+    left = f"; the first {MOST_DRAWN} of {number} cases are drawn" if number > MOST_DRAWN else ""
+    text = f"{store.sizes['point']} periodic motions along {followed(store)}{left}."
+    return {"text": text, "cases": cases}
+
+
+def run_up_facts(store: xr.Dataset) -> dict[str, Any]:
+    """Return what the page shows of cases whose speed changes.
+
+    Returns
+    -------
+    dict
+        `text`: how many cases are drawn and of which signal, "" where the store has none; `cases`: of the
+        first that are done `label`, the values of their axes, and `pictures`: names and addresses that
+        contain them.
+    """
+    if not is_run_up(store) or "status" not in store:
+        return {"text": "", "cases": []}
+    done = np.argwhere(store["status"].values == DONE)
+    if not len(done):
+        return {"text": "", "cases": []}
+    signal = _signal(store)
+    axes = axes_of(store)
+    cases = []
+    for place in done[:MOST_DRAWN].tolist():
+        case = store.isel(dict(zip(axes, place, strict=True)))
+        varied = [name for name in axes if store.sizes[name] > 1 and name in case.coords]
+        n = int(np.isfinite(case["speed"].values).sum())
+        pictures = [("Speed", picture(speed(case), is_shared=True))]
+        if n >= _FEWEST:
+            pictures.append(("Bode plot", picture(bode(case, signal), is_shared=True)))
+        if n > _WINDOW and signal in case:
+            pictures.append(("Waterfall", picture(waterfall(case, signal=signal))))
+        cases.append(
+            {
+                "label": ", ".join(written_value(case[name]).replace("$", "") for name in varied),
+                "pictures": [{"name": name, "address": address} for name, address in pictures],
+            }
+        )
+    left = f"; the first {MOST_DRAWN} of {len(done)} cases are drawn" if len(done) > MOST_DRAWN else ""
+    named = signal.removeprefix(PROBE).replace("_", " ")
+    named = f"the probe {named}" if signal.startswith(PROBE) else f"the {named} motion"
+    return {"text": f"Speed, and Bode plot and waterfall of {named}{left}.", "cases": cases}
+
+
+def _signal(store: xr.Dataset) -> str:
+    """The signal that is drawn: of the first probe, if possible of a displacement, or the vertical motion."""
+    prefix = AMPLITUDE + PROBE
+    probes = [str(name).removeprefix(AMPLITUDE) for name in store.data_vars if str(name).startswith(prefix)]
+    displaced = [name for name in probes if store[AMPLITUDE + name].attrs.get("units") == "m"]
+    return (displaced or probes or ["vertical"])[0]
+
+
+def design_facts(store: xr.Dataset) -> dict[str, Any]:
+    """Return what the page says of the rotor without contact, of the rig as the study states it.
+
+    Returns
+    -------
+    dict
+        `rows`: one for each critical speed, with `speed` (rpm), `whirl`, `damping` (%) and `excited`, as
+        text; `diagram`: the Campbell diagram as an address that contains its SVG; `text`: on stability, or
+        why there is no linear design.
+    """
+    try:
+        return _facts(json.dumps(rig_of(store).as_dict(), sort_keys=True))
+    except RubError as error:
+        return {"rows": [], "diagram": "", "text": f"There is no linear design of this rig: {error}."}
+
+
+@cache
+def _facts(table: str) -> dict[str, Any]:
+    """Return the facts of a rig, by its table as JSON: a served page asks again and again."""
+    from rubhpc.fem.linear_design import linear_design
+
+    design = linear_design(rig_from_dict(json.loads(table), "rig"))
+    columns = (design[f"critical_{name}"].values for name in ("speed", "whirl", "damping_ratio"))
+    rows = [
+        {
+            "speed": f"{_RPM * speed:.0f}",
+            "whirl": str(whirl),
+            "damping": f"{100 * damping:.3g}",
+            "excited": "yes" if excited else "no",
+        }
+        for speed, whirl, damping, excited in zip(*columns, design["is_excited"].values, strict=True)
+    ]
+    top = _RPM * float(design["speed"].values[-1])
+    threshold = _RPM * float(design["threshold_speed"])
+    stability = (
+        f"stable up to {top:.0f} rpm, as far as the diagram goes"
+        if math.isnan(threshold)
+        else f"unstable from {threshold:.0f} rpm on"
+    )
+    return {"rows": rows, "diagram": _diagram(design), "text": f"Without contact, the rotor is {stability}."}
+
+
+def _diagram(design: xr.Dataset) -> str:
+    speeds, modes = design["critical_speed"].values, design["critical_mode"].values
+    critical = [(int(mode), float(speed)) for mode, speed in zip(modes, speeds, strict=True)]
+    limit = 1.5 * float(design["speed"].values[-1]) / (2 * math.pi)
+    content = io.BytesIO()
+    with house_style():
+        figure, (ax,) = new_figure(height=80, width=120)
+        campbell_diagram(design, ax, critical, limit)
+        figure.savefig(content, format="svg", metadata={"Date": None})
+    return "data:image/svg+xml;base64," + base64.b64encode(content.getvalue()).decode()

@@ -9,8 +9,7 @@ from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import TYPE_CHECKING, Any
 
-from postproc.report.detail import FULL
-from postproc.report.packing import pack_floats
+from postproc.report.packing import FULL, pack_floats
 from postproc.report.page import Page
 from rubhpc.errors import InputError
 

@@ -229,10 +229,15 @@ def _place(case: xr.Dataset, stator: int) -> int:
     return stator - 1
 
 
+def runs_of(mask: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return where the runs of a mask (n,) begin and end, half open, (n_run,) each."""
+    ends = np.diff(np.pad(mask.astype(np.int8), 1))
+    return np.flatnonzero(ends == 1), np.flatnonzero(ends == -1)
+
+
 def _spans(case: xr.Dataset, inside: NDArray[np.bool_], whole: bool) -> xr.Dataset:
     """Return the runs of a mask (n_sample,) as spans over time."""
-    ends = np.diff(np.pad(inside.astype(np.int8), 1))
-    first, end = np.flatnonzero(ends == 1), np.flatnonzero(ends == -1)
+    first, end = runs_of(inside)
     if whole:
         kept = (first > 0) & (end < inside.size)
         first, end = first[kept], end[kept]

@@ -1,4 +1,4 @@
-"""Waveforms of cases: the last revolutions of some signals."""
+"""Waveforms of cases: the last revolutions of some signals, and where stators on a carrier are on average."""
 
 from __future__ import annotations
 
@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from postproc.signals.carried import NEEDED, mean_shift
 from postproc.signals.spectra import check_signal, samples_per_revolution
 from postproc.store.attributes import MEASURED
 from postproc.store.axes import find_axis, source
-from postproc.store.rig_of_case import is_carried
+from postproc.store.rig_of_case import is_carried, rig_of
 from postproc.store.run_ups import first_around, is_run_up
 from postproc.store.select import narrow
 from rubhpc.errors import InputError
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
 _AT_A_SPEED = 4  # revolutions around a speed of a run-up, by default
 _ONE_SPEED = 2e-3  # by which the speeds of several cases may differ where one is named
 DEFAULT_SIGNALS = ("vertical", "horizontal", "torsion", "contact_force")
+NEEDED = ("stator_axial", "stator_lateral", "contact_force")
 
 
 def default_signals(store: xr.Dataset) -> tuple[str, ...]:
@@ -153,11 +153,8 @@ def _ends_around(
     """Ends of `count` revolutions around a speed, rad/s, that each case first has; 0 of one without any."""
     ends = np.zeros_like(turned)
     for place in np.ndindex(turned.shape):
-        end = int(turned[place])
-        own = speed.values[place][:end]
-        if not own.size:
-            continue
-        ends[place] = first_around(store, own, count, at) + count
+        if end := int(turned[place]):
+            ends[place] = first_around(store, speed.values[place][:end], count, at) + count
     return ends
 
 
@@ -166,3 +163,28 @@ def _speeds(speed: xr.DataArray, until: NDArray[np.int64], revolutions: int) -> 
     rows, ends = np.atleast_2d(speed.values), np.atleast_1d(until)
     kept = [row[[max(end - revolutions, 0), end - 1]] for row, end in zip(rows, ends, strict=True) if end]
     return kept[0].tolist() if np.allclose(kept, kept[0], rtol=_ONE_SPEED) else []
+
+
+def mean_shift(tips: xr.Dataset) -> NDArray[np.float64]:
+    """Return how far the carrier of each stator has moved up and to +z on average, (n_stator, 2), m.
+
+    It is read from the tips that touch nothing, which move with it: `v cos a + w sin a` outwards and
+    `w cos a - v sin a + s` along the rim, where s is a turn. Stators on the ground have not moved.
+
+    Parameters
+    ----------
+    tips : Dataset
+        `stator_axial`, `stator_lateral` (m) and `contact_force` (N) of one case over stator and sample.
+    """
+    stators = rig_of(tips).stator
+    axial, lateral, force = (tips[name].transpose("stator", "sample").values.mean(axis=1) for name in NEEDED)
+    shift = np.zeros((len(stators), 2))
+    for name in {stator.carrier for stator in stators} - {None}:
+        carried = np.array([i for i, stator in enumerate(stators) if stator.carrier == name])
+        free = carried[force[carried] == 0.0]
+        seen = free if free.size > 1 else carried
+        c, s = (f(np.array([stators[i].angle for i in seen])) for f in (np.cos, np.sin))
+        rows = np.concatenate([np.stack([c, s, 0.0 * c], 1), np.stack([-s, c, np.ones_like(c)], 1)])
+        found, *_ = np.linalg.lstsq(rows, np.concatenate([axial[seen], lateral[seen]]))
+        shift[carried] = found[:2]
+    return shift

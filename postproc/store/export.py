@@ -8,7 +8,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rubhpc.errors import InputError, reason_of
+from rubhpc.errors import InputError, writing
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,19 +48,15 @@ def write_data(data: xr.Dataset, path: str | Path) -> Path:
     kind = path.suffix.lower()
     data = data.copy()
     data.attrs = {k: v for k, v in data.attrs.items() if isinstance(v, str | int | float)}
-    try:
+    with writing(path, "--data"):
         if kind == ".csv":
             _write_csv(data, path)
         elif kind == ".json":
             path.write_text(json.dumps(_plain(data.to_dict()), allow_nan=False))
         elif kind == ".zarr":
-            _bare(data).to_zarr(path, zarr_format=3, consolidated=False)
+            data.drop_encoding().to_zarr(path, zarr_format=3, consolidated=False)
         else:
             write_hdf5(data, path)
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot be written: {reason_of(error, path)}; choose another --data"
-        ) from error
     return path
 
 
@@ -79,7 +75,7 @@ def write_hdf5(data: xr.Dataset, path: Path) -> None:
 
     Tables of attributes (study, rig, versions) become text in JSON.
     """
-    data = _bare(data).copy()
+    data = data.drop_encoding()  # without the compression and chunks of the store that it came from
     data.attrs = {
         k: v if isinstance(v, str | int | float) else json.dumps(_plain(v)) for k, v in data.attrs.items()
     }
@@ -90,11 +86,6 @@ def write_hdf5(data: xr.Dataset, path: Path) -> None:
         os.replace(partial, path)
     finally:
         partial.unlink(missing_ok=True)
-
-
-def _bare(data: xr.Dataset) -> xr.Dataset:
-    """Return the data without the compression and chunks of the store it came from."""
-    return data.drop_encoding()
 
 
 def _plain(value: Any) -> Any:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from rubhpc.errors import InputError, reason_of
+from rubhpc.errors import InputError, writing
 
 FOLDER = "paper"  # where the studies of jobs/paper put their stores
 
@@ -30,9 +30,10 @@ def claims(number: int | None, stores: str, is_json: bool, document: str | None,
     `make paper` runs the studies. Where the paper leaves a value open or contradicts itself, the result is
     only reported.
     """
-    from postproc.mokhtar2017.claims.index import CLAIMS, FAILS, evaluate, on_figure, open_studies
-    from postproc.mokhtar2017.claims.table import as_json, document_of, text
-    from postproc.mokhtar2017.figures.index import FIGURES, draw_figures
+    from postproc.mokhtar2017.claims.cases import open_studies
+    from postproc.mokhtar2017.claims.claim import FAILS, as_json, document_of, text
+    from postproc.mokhtar2017.claims.table import CLAIMS, on_figure
+    from postproc.mokhtar2017.figures.pages import FIGURES, draw_figures
 
     if document and number is not None:
         raise InputError("--document: contains all claims; leave out --figure")
@@ -40,20 +41,12 @@ def claims(number: int | None, stores: str, is_json: bool, document: str | None,
     figures = [n for n in FIGURES if number in (None, n)] if draw else []
     needed = [*(s for c in chosen for s in c.studies), *(s for n in figures for s in FIGURES[n].studies)]
     opened = open_studies(stores, needed)
-    results = evaluate(chosen, opened)
+    results = [claim.evaluate(opened) for claim in chosen]
     click.echo(as_json(results) if is_json else text(results, shutil.get_terminal_size((120, 24)).columns))
     if document:
-        _write(Path(document), document_of(results))
+        with writing(Path(document), "--document"):
+            Path(document).write_text(document_of(results), encoding="utf-8")
     if draw:
         for path in draw_figures(figures, opened, draw):
             click.echo(str(path), err=is_json)
     return int(any(result.verdict == FAILS for result in results))
-
-
-def _write(path: Path, content: str) -> None:
-    try:
-        path.write_text(content, encoding="utf-8")
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot be written: {reason_of(error, path)}; choose another --document"
-        ) from error

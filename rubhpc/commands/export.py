@@ -25,9 +25,8 @@ def export(store: str, selection: tuple[str, ...], names: tuple[str, ...], outpu
     has one row a case, with axes, settings and measures, or one a revolution where each --value is of the
     revolutions of run-ups; Parquet needs `pip install 'rubhpc[parquet]'`.
     """
-    from postproc.store.case_table import TABLES, case_table, write_table
+    from postproc.store.case_table import TABLES, case_table, has_revolutions, revolution_table, write_table
     from postproc.store.export import HDF5, check_folder, write_hdf5
-    from postproc.store.revolution_table import has_revolutions, revolution_table
     from rubhpc.input.messages import nearest
 
     cases = open_cases(store, selection)

@@ -73,7 +73,7 @@ def draw(
 ) -> None:
     """Draw and save a figure, write its data where asked, and print its lines and the paths of all files."""
     from postproc.beside import figure_beside, samples_of
-    from postproc.figures.style import check_figure_path
+    from postproc.figures.drawing import check_figure_path
     from postproc.store.export import check_data_path, write_data
 
     path = check_figure_path(output or f"{Path(store).resolve().stem}_{figure.name}.png")

@@ -58,8 +58,8 @@ def knock(
     files next to the figure until it is drawn, so that the same command resumes an interrupted search. With
     --workers, or under mpirun, several processes share the cases.
     """
+    from postproc.figures.drawing import check_figure_path
     from postproc.figures.resilience_curve import resilience
-    from postproc.figures.style import check_figure_path
     from postproc.store.export import check_data_path, write_data
     from rubhpc.knock_cases import Progress
     from rubhpc.knocks import least_knock

@@ -76,8 +76,8 @@ def modes(
     stands still. --range, --operating, --response, --shapes or --data add a linear design: critical speeds,
     peaks of the unbalance response with amplification factor and separation margin, static sag, stability.
     """
+    from postproc.figures.drawing import check_figure_path
     from postproc.figures.linear_design import mode_shapes, unbalance_response
-    from postproc.figures.style import check_figure_path
     from postproc.store.export import check_data_path, write_data
     from rubhpc.commands.design import plain_design, print_design
     from rubhpc.fem.assemble import assemble
@@ -211,8 +211,8 @@ def _draw(model: Model, top_speed: float, count: int | None, path: Path) -> None
 
     import numpy as np
 
-    from postproc.figures.campbell import campbell_diagram
-    from postproc.figures.style import house_style, new_figure, save
+    from postproc.figures.drawing import house_style, new_figure, save
+    from postproc.figures.linear_design import campbell_diagram
     from rubhpc.fem.campbell import campbell, critical_speeds
     from rubhpc.fem.linear_design import checked_range
 

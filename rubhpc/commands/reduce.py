@@ -80,7 +80,7 @@ def reduce(
     from postproc.cases.reduction import of_spectra, reduce_store
     from postproc.cases.workers import become_rank_of_cluster
     from postproc.cases.workers import workers as on_workers
-    from postproc.figures.style import check_figure_path
+    from postproc.figures.drawing import check_figure_path
     from postproc.store.export import check_data_path, write_data
 
     if (of_spectra(what) and measure) or (not of_spectra(what) and signal):
@@ -109,8 +109,8 @@ def reduce(
 
 
 def _draw(found: Any, what: str, signal: str, path: Path) -> None:
+    from postproc.figures.drawing import house_style, new_figure, save
     from postproc.figures.spectrum import draw_spectrum
-    from postproc.figures.style import house_style, new_figure, save
 
     shown = found[f"spectrum_{signal}"].squeeze()
     with house_style():

@@ -24,7 +24,7 @@ def report(store: Path, output: Path | None, limit: str) -> None:
     case opens with its orbit, spectrum, waveform and Poincaré section. It also works during a run.
     """
     from postproc.report.budget import write_report
-    from postproc.store.live import open_live
+    from postproc.store.open import open_live
     from rubhpc.errors import InputError
 
     size = quantity(limit, "byte", "--limit")
@@ -52,7 +52,7 @@ def view(store: Path, port: int) -> None:
     import contextlib
 
     from postproc.report.server import Library, Server
-    from postproc.store.live import open_live
+    from postproc.store.open import open_live
 
     with Server(Library(lambda: open_live(store)), port) as server, contextlib.suppress(KeyboardInterrupt):
         click.echo(f"{store} is served at {server.url} (Ctrl-C ends it)")

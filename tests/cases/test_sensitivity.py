@@ -14,8 +14,8 @@ from SALib.analyze import sobol as sobol_estimate
 from SALib.sample import sobol as sobol_sample
 from SALib.test_functions import Ishigami
 
-from postproc.cases.factorial import grid_indices
 from postproc.cases.sensitivity import MOST_FILLED, sensitivity
+from postproc.cases.sobol import grid_indices
 from postproc.catalogue import figures
 from postproc.figures.sensitivity import draw_bars
 from rubhpc.commands.figures import figure_command

@@ -8,7 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 from scipy.linalg import eigvals
 
-from postproc.figures.campbell import campbell_diagram
+from postproc.figures.linear_design import campbell_diagram
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.campbell import campbell, critical_speeds
 from rubhpc.fem.modes import modes

@@ -111,21 +111,8 @@ def test_a_resonance_has_the_amplification_factor_of_its_damping():
     assert not peaks_of(np.r_[speed, speed[::-1]], np.r_[response, response].real, np.r_[lag, lag])
 
 
-def test_a_bode_plot_names_the_peaks_of_1x():
-    speed = np.linspace(50.0, 150.0, 101)
-    response = 1e-5 / (1.0 - (speed / 100.0) ** 2 + 0.1j * speed / 100.0)
-    angle = 2 * math.pi * np.arange(6 * N) / N
-    signal = (response[:, None] * np.exp(1j * angle)).real
-    data = study().isel(friction=0, speed=[0] * 101, drop=True).assign(vertical=(("speed", "sample"), signal))
-    data = data.assign(vertical=data["vertical"].assign_attrs(units="m"))
-    data["spin_speed"] = "speed", speed, {"units": "rad s-1"}
-    axes = bode(data.assign_coords(speed=speed)).show()
-    assert [text.get_text() for text in axes[0].texts] == ["955 rpm, AF 9.93"]
-    assert not bode(data.assign_coords(speed=speed), order=2.0).show()[0].texts
-
-
 @pytest.mark.parametrize(("touched", "words"), [(100.0, "955 rpm, rub"), (140.0, "955 rpm, AF 9.93")])
-def test_a_peak_within_which_the_rotor_rubs_has_no_amplification_factor(touched, words):
+def test_peaks_of_1x_are_named_and_have_no_amplification_factor_where_the_rotor_rubs(touched, words):
     speed = np.linspace(50.0, 150.0, 101)
     response = 1e-5 / (1.0 - (speed / 100.0) ** 2 + 0.1j * speed / 100.0)
     angle = 2 * math.pi * np.arange(6 * N) / N
@@ -137,8 +124,11 @@ def test_a_peak_within_which_the_rotor_rubs_has_no_amplification_factor(touched,
         contact_fraction=(("stator", "speed"), share),
         spin_speed=("speed", speed, {"units": "rad s-1"}),
     )
-    axes = bode(data.assign_coords(speed=speed)).show()
-    assert [text.get_text() for text in axes[0].texts] == [words]
+    data = data.assign_coords(speed=speed)
+    assert [text.get_text() for text in bode(data).show()[0].texts] == [words]
+    unknown = bode(data.drop_vars("contact_fraction")).show()[0]
+    assert [text.get_text() for text in unknown.texts] == ["955 rpm, AF 9.93"]
+    assert not bode(data, order=2.0).show()[0].texts
 
 
 def test_stretches_of_a_lag_lie_by_the_curve_drawn_before():

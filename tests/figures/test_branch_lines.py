@@ -3,7 +3,7 @@
 import pytest
 
 from postproc.figures.branch_lines import name_branches
-from postproc.figures.style import house_style, new_figure
+from postproc.figures.drawing import house_style, new_figure
 
 NAMES = (
     *("P1, stable", "P1, unstable", "P2, stable", "P2, unstable", "P4, stable", "P4, unstable"),

@@ -13,7 +13,7 @@ import xarray as xr
 from postproc.figures.cascade import cascade as cascade_figure
 from postproc.figures.cascade import default_limit, intensity, waterfall
 from postproc.figures.cascade_lines import draw_frequencies, draw_orders
-from postproc.figures.style import house_style, new_figure
+from postproc.figures.drawing import house_style, new_figure
 from postproc.signals.cascade import below, cascade, hold_peaks, hold_rows
 from postproc.store.rig_of_case import natural_frequencies, stator_places
 from postproc.store.select import select
@@ -151,6 +151,8 @@ def test_natural_frequencies_are_those_of_the_rig(cases):
     found = natural_frequencies(cases)
     assert float(found["lateral"]) == pytest.approx(31.5596, rel=1e-4)
     assert float(found["torsional"]) == pytest.approx(128.0471, rel=1e-4)
+    with pytest.raises(InputError, match="contains no rig"):
+        natural_frequencies(xr.Dataset())
 
 
 def test_natural_frequencies_follow_an_axis_of_the_rig(cases):
@@ -162,10 +164,6 @@ def test_natural_frequencies_follow_an_axis_of_the_rig(cases):
     assert float(lateral[1]) == pytest.approx(31.5596, rel=1e-4)
     assert float(lateral[0]) < 0.9 * float(lateral[1])
     assert float(natural_frequencies(bearing.isel(rotor_bearing_stiffness=0))["lateral"]) == float(lateral[0])
-
-
-def test_stators_stand_where_the_rig_says(cases):
-    assert stator_places(cases) == [(0.0, 0.0, 0.0, 0.0)]
 
 
 def test_stators_follow_the_axes_of_a_real_study(cases):
@@ -181,7 +179,8 @@ def test_stators_follow_the_axes_of_a_real_study(cases):
     assert stator_places(case) == [(1.2, 0.0, 0.0, 0.0)]
 
 
-def test_stators_stand_about_the_shaft_that_they_are_set_about(cases):
+def test_stators_stand_where_the_rig_says_and_about_the_shaft_that_they_are_set_about(cases):
+    assert stator_places(cases) == [(0.0, 0.0, 0.0, 0.0)]
     keys = {"rotor.gravity": 9.81, "rotor.clearance_from": "standstill"}
     rig = with_keys(read_rig("mokhtar2017"), keys)
     ((_, _, across, up),) = stator_places(cases.assign_attrs(rig=rig.as_dict()))
@@ -193,11 +192,6 @@ def test_a_stator_over_another_disc_is_not_at_this_one(cases):
     rig["stator"] += [rig["stator"][0] | {"node": 4, "radius": 0.05, "angle": 1.0}]
     rig["stator"] += [rig["stator"][0] | {"angle": 2.0, "clearance_offset": 1e-5}]
     assert stator_places(cases.assign_attrs(rig=rig)) == [(0.0, 0.0, 0.0, 0.0), (2.0, 1e-5, 0.0, 0.0)]
-
-
-def test_a_store_without_a_rig_says_so():
-    with pytest.raises(InputError, match="contains no rig"):
-        natural_frequencies(xr.Dataset())
 
 
 def test_the_default_limit_shows_modes_and_the_fastest_1x(spectra, cases):

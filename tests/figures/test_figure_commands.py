@@ -13,6 +13,8 @@ import xarray as xr
 from click.testing import CliRunner
 
 from postproc.catalogue import figures
+from postproc.store.open import open_store
+from postproc.store.select import select
 from rubhpc.commands.figures import figure_command
 from rubhpc.errors import InputError
 
@@ -48,17 +50,12 @@ def run(tmp_path, monkeypatch):
             "cascade",
             [*options(CLEARANCE, FRICTION, MODULUS), "--form", "intensity", "--mark", "stiff=53.5 Hz"],
         ),
-        ("cascade", [*options(CLEARANCE, FRICTION, MODULUS), "--orders", "--signal", "vertical"]),
         ("cascade", [*options(CLEARANCE, FRICTION, MODULUS), "--full"]),
-        ("map", []),
         ("map", ["--value", "regime", "--x", "clearance", "--y", "friction"]),
-        ("orbit", ONE),
         ("orbit", [*options(CLEARANCE, FRICTION, "speed_ratio=1.5"), "--over", "stator.youngs_modulus"]),
-        ("spectrum", ONE),
         ("spectrum", [*ONE, "--full", "--orders"]),
         ("spectrum", [*options(CLEARANCE, MODULUS, "speed_ratio=1.5"), "--over", "friction", "--log"]),
         ("waveform", ONE),
-        ("section", ONE),
         ("section", [*options(CLEARANCE, FRICTION, MODULUS), "--over", "speed_ratio", "--y", "torsion"]),
     ],
 )
@@ -155,3 +152,10 @@ def test_the_help_of_a_figure_loads_nothing_heavy():
     )
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
     subprocess.run([sys.executable, "-c", script], env=environment, check=True, timeout=60)
+
+
+def test_a_spectrum_needs_no_selection_of_an_axis_of_one_value(synthetic_path):
+    store = select(open_store(synthetic_path), {"clearance": 84e-6, "friction": 0.3})
+    store = store.isel(speed_ratio=[1], stator_youngs_modulus=[0])
+    drawing = figures()["spectrum"].of(store, "vertical")
+    assert drawing.lines[0].split()[:2] == ["1X", "31.560"]

@@ -9,12 +9,12 @@ from matplotlib.markers import TICKDOWN, TICKRIGHT
 
 from postproc.cases.maps import default_axes, map_data
 from postproc.figures.cells import cell_edges, hatch_cells, outline_cells
+from postproc.figures.drawing import check_figure_path, house_style, new_figure, save
 from postproc.figures.map import value_maps
 from postproc.figures.orbit import draw_orbit, orbit
-from postproc.figures.overlay import overlaid
 from postproc.figures.section import draw_section
+from postproc.figures.small_multiples import overlaid
 from postproc.figures.spectrum import default_limit, draw_spectrum
-from postproc.figures.style import check_figure_path, house_style, new_figure, save
 from postproc.figures.waveform import draw_panels, draw_waveform
 from postproc.signals.lines import strongest_lines
 from postproc.signals.sections import section_data
@@ -95,7 +95,7 @@ def test_no_map_of_what_is_no_scalar(plain_map):
         plain_map("peak_torsio")
 
 
-def test_a_map_is_drawn_with_units_and_hatching(plain_map, ax):
+def test_a_map_is_drawn_with_units_hatching_and_ticks(plain_map, ax):
     assert value_maps(plain_map("peak_contact_force"), "peak_contact_force", [ax]) == [ax]
     assert ax.get_xlabel() == "Speed ratio $r$"
     assert ax.get_ylabel() == "Clearance (µm)"
@@ -108,6 +108,9 @@ def test_a_map_is_drawn_with_units_and_hatching(plain_map, ax):
         "out of range in 6 of 12 cases: slip (6), Euler load (3)",
     ]
     ax.figure.canvas.draw()
+    assert ax.get_yticks() == pytest.approx([70, 84, 100])  # few values: each has its tick
+    assert ax.get_xticks() == pytest.approx([0.75, 1.0, 1.25, 1.5, 1.7])
+    assert [text.get_text() for text in ax.get_xticklabels()] == ["0.75", "1", "1.25", "1.5", "1.7"]
 
 
 def test_regimes_have_colours_of_their_own(plain_map, ax):
@@ -120,15 +123,18 @@ def test_regimes_have_colours_of_their_own(plain_map, ax):
     assert colors[0, 0][3] == 0  # diverged: nothing but its hatch
 
 
-def test_periods_are_named(plain_map, ax):
-    value_maps(plain_map("period"), "period", [ax])
-    assert bar_names(ax) == ["none", "P1", "P2"]
-
-
-def test_the_status_is_a_map_too(plain_map, ax):
-    value_maps(plain_map("status"), "status", [ax])
-    assert bar_names(ax) == ["missing", "done", "failed", "diverged"]
-    assert not ax.figure.legends
+@pytest.mark.parametrize(
+    ("value", "names"),
+    [
+        ("period", ["none", "P1", "P2"]),
+        ("status", ["missing", "done", "failed", "diverged"]),
+        ("settled", ["settled"]),
+    ],
+)
+def test_flags_are_named(plain_map, ax, value, names):
+    value_maps(plain_map(value), value, [ax])
+    assert bar_names(ax) == names
+    assert bool(ax.figure.legends) == (value != "status")
 
 
 def test_a_map_of_settings_needs_no_result(store, ax):
@@ -158,6 +164,8 @@ def test_cells_meet_half_way_also_on_a_log_scale():
     assert cell_edges(np.array([1.0, 2.0, 4.5])) == pytest.approx([0.5, 1.5, 3.25, 5.75])
     assert cell_edges(np.array([1.0, 10.0, 100.0])) == pytest.approx(10 ** np.array([-0.5, 0.5, 1.5, 2.5]))
     assert cell_edges(np.array([0.3])) == pytest.approx([0.15, 0.45])
+    assert cell_edges(np.array([0.1, 0.4])) == pytest.approx([0.0, 0.25, 0.55])  # none below 0
+    assert cell_edges(np.array([0.0, 0.2])) == pytest.approx([-0.1, 0.1, 0.3])
 
 
 def test_hatched_cells_are_one_patch_of_their_area(ax):
@@ -207,7 +215,7 @@ def test_too_many_curves_are_refused(store):
     wave = store["vertical"].isel(clearance=0, friction=0, stator_youngs_modulus=0)
     many = wave.isel(speed_ratio=[0, 1, 2, 3, 4, 0, 1, 2])
     with pytest.raises(InputError, match="speed_ratio: 8 curves"):
-        overlaid(many, "sample")
+        overlaid("sample", many)
 
 
 def test_a_case_that_is_not_done_has_no_orbit(store, ax):
@@ -266,9 +274,6 @@ def test_sections_are_stored_or_every_whole_revolution():
     assert found.values == pytest.approx(
         section_data(stored, ["vertical"])["section_vertical"].values, rel=1e-6
     )
-
-
-def test_a_section_that_is_not_kept_says_so():
     with pytest.raises(InputError, match='"section" in'):
         section_data(synthetic_store.make(keep=()), ["vertical"])
 
@@ -316,6 +321,7 @@ def test_figures_are_saved_by_their_extension(tmp_path, case):
     with house_style():
         for suffix in (".png", ".pdf", ".svg"):
             figure, (ax,) = new_figure()
+            assert 85 <= figure.get_figwidth() * 25.4 <= 90  # one column
             draw_orbit(orbit_data(case), ax)
             path = save(figure, tmp_path / f"orbit{suffix}")
             assert path.stat().st_size > 1000
@@ -328,12 +334,6 @@ def test_figures_are_saved_by_their_extension(tmp_path, case):
 def test_a_figure_that_cannot_be_saved_is_bad_input(tmp_path, name, said):
     with pytest.raises(InputError, match=said):
         check_figure_path(tmp_path / name)
-
-
-def test_figures_are_one_column_wide():
-    with house_style():
-        figure, _ = new_figure()
-    assert 85 <= figure.get_figwidth() * 25.4 <= 90
 
 
 def test_velocities_are_those_of_the_sines(case):
@@ -405,18 +405,6 @@ def test_what_had_not_settled_is_hatched(store, ax):
     patch = next(p for p in ax.patches if p.get_label() == "not settled")
     corners = patch.get_path().vertices
     assert (corners[:, 0].min(), corners[:, 0].max()) == pytest.approx((1.125, 1.375))
-
-
-def test_settling_has_a_map_of_its_own(plain_map, ax):
-    value_maps(plain_map("settled"), "settled", [ax])
-    assert bar_names(ax) == ["settled"]
-
-
-def test_an_axis_of_few_values_is_ticked_at_them(plain_map, ax):
-    value_maps(plain_map("peak_contact_force"), "peak_contact_force", [ax])
-    assert ax.get_yticks() == pytest.approx([70, 84, 100])
-    assert ax.get_xticks() == pytest.approx([0.75, 1.0, 1.25, 1.5, 1.7])
-    assert [text.get_text() for text in ax.get_xticklabels()] == ["0.75", "1", "1.25", "1.5", "1.7"]
 
 
 def test_a_line_surrounds_what_is_out_of_range_where_that_is_most(plain_map, ax):

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from trial_rig import trial_rig
 
+from postproc.figures.drawing import house_style, new_figure
 from postproc.figures.linear_design import mode_shapes, unbalance_response
-from postproc.figures.style import house_style, new_figure
 from rubhpc import InputError, Rig, Unbalance, linear_design
 
 

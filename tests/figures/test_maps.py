@@ -10,11 +10,10 @@ from click.testing import CliRunner
 
 from postproc.cases.maps import default_axes, facet_axes, map_data
 from postproc.catalogue import figures
-from postproc.figures.cells import cell_edges
+from postproc.figures.drawing import house_style, new_figure
 from postproc.figures.map import map as draw_map
 from postproc.figures.map import value_maps
 from postproc.figures.small_multiples import name_facets
-from postproc.figures.style import house_style, new_figure
 from postproc.store.open import open_store
 from rubhpc.commands.figures import figure_command
 from rubhpc.errors import InputError
@@ -137,11 +136,6 @@ def test_a_map_reads_speeds_in_rpm_as_its_axes_do(synthetic_path, axes):
     value_maps(data(synthetic_path, "spin_speed"), "spin_speed", axes)
     assert axes[0].figure.axes[-1].get_ylabel() == "Spin speed (rpm)"
     assert axes[0].collections[0].get_clim()[1] == pytest.approx(1.7 * synthetic_store.FIRST_LATERAL * 60)
-
-
-def test_what_is_above_zero_has_no_cell_below():
-    assert list(cell_edges(np.array([0.1, 0.4]))) == pytest.approx([0.0, 0.25, 0.55])
-    assert list(cell_edges(np.array([0.0, 0.2]))) == pytest.approx([-0.1, 0.1, 0.3])
 
 
 def test_names_of_facets_stay_within_their_panels():

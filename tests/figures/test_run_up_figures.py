@@ -16,7 +16,7 @@ from postproc.figures.run_up_marks import critical_speeds, name_speeds
 from postproc.figures.spectrum import spectrum
 from postproc.figures.speed import speed
 from postproc.figures.waterfall import waterfall
-from postproc.signals.run_up_spectra import mean_positions, run_up_spectra
+from postproc.signals.run_ups import mean_positions, run_up_spectra
 from rubhpc import LumpedStator, Rig, Unbalance
 from rubhpc.errors import InputError
 
@@ -242,8 +242,8 @@ def test_speeds_of_a_polar_plot_keep_clear_of_the_names_of_the_rays():
 
 def test_critical_speeds_are_those_that_the_unbalance_excites():
     cases = run_up(rig=mass_of_1_kg(1e4, 9e6).as_dict())
-    assert critical_speeds(cases, 50.0, 150.0) == pytest.approx([100.0])
-    assert critical_speeds(run_up(), 50.0, 150.0) == []
+    assert critical_speeds(cases, xr.DataArray([50.0, 150.0])) == pytest.approx([100.0])
+    assert critical_speeds(run_up(), run_up()["speed"]) == []
     _, phase = bode(cases, "probe_left").show()
     assert [text.get_text() for text in phase.get_legend().get_texts()] == ["critical speed, 955 rpm"]
 
@@ -259,8 +259,8 @@ def test_figures_of_cases_of_one_law_seek_them_once(monkeypatch):
         )[1],
     )
     cases = run_up(rig=mass_of_1_kg(1e4, 2e4).as_dict())
-    assert critical_speeds(cases, 50.2, 150.0) == [100, 149.9]
-    assert critical_speeds(cases, 50.1, 149.8) == [100]
+    assert critical_speeds(cases, xr.DataArray([50.2, 150.0])) == [100, 149.9]
+    assert critical_speeds(cases, xr.DataArray([50.1, 149.8])) == [100]
     assert len(asked) == 1
     assert asked[0][0] <= 50.1
     assert asked[0][-1] >= 150.0

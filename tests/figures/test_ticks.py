@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 from matplotlib.figure import Figure
 
-from postproc.figures.ticks import degree_steps, tick_levels
+from postproc.figures.cells import degree_steps, tick_levels
 
 
 def labelled(values: list[float], width: float) -> list[str]:

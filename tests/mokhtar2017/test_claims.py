@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from spoiling import SPOILED
 
-from postproc.mokhtar2017.claims.cases import CaseFailed, cases
-from postproc.mokhtar2017.claims.index import CLAIMS, FAILS, HOLDS, REPORTED, evaluate, figures_of, on_figure
+from postproc.mokhtar2017.claims.cases import FREEDOM, SIXTH_HARMONIC, CaseFailed
+from postproc.mokhtar2017.claims.claim import FAILS, HEAD, HOLDS, REPORTED, as_json, document_of, text
 from postproc.mokhtar2017.claims.loops import count_loops
-from postproc.mokhtar2017.claims.models import tilt
-from postproc.mokhtar2017.claims.table import HEAD, as_json, document_of, text
+from postproc.mokhtar2017.claims.quantities import tilt
+from postproc.mokhtar2017.claims.table import CLAIMS, on_figure
 from rubhpc.errors import InputError, StoreError
 from rubhpc.schema import DIVERGED, MISSING
 
@@ -26,11 +26,11 @@ DOCUMENT = Path(__file__).parents[2] / "docs" / "claims.md"
 
 @pytest.fixture(scope="module")
 def results(sound):
-    return evaluate(CLAIMS, sound)
+    return [claim.evaluate(sound) for claim in CLAIMS]
 
 
 def test_each_claim_holds_on_what_it_describes_or_is_reported(results):
-    assert {r.claim.id: r.finding.found for r in results if r.verdict == FAILS} == {}
+    assert {r.claim.id: r.found for r in results if r.verdict == FAILS} == {}
     assert {r.claim.id for r in results if r.verdict == REPORTED} == BY_ID.keys() - set(GATED)
 
 
@@ -41,12 +41,12 @@ def test_every_gated_claim_is_spoiled():
 
 @pytest.mark.parametrize(("name", "i"), [(name, i) for name in GATED for i in range(len(SPOILED[name]))])
 def test_a_claim_fails_on_what_it_does_not_describe(name, i, sound):
-    (result,) = evaluate([BY_ID[name]], SPOILED[name][i](sound))
-    assert result.verdict == FAILS, result.finding.found
+    result = BY_ID[name].evaluate(SPOILED[name][i](sound))
+    assert result.verdict == FAILS, result.found
 
 
 def test_findings_show_the_known_content(results):
-    found = {r.claim.id: r.finding.found for r in results}
+    found = {r.claim.id: r.found for r in results}
     assert found["C14"] == "11/2X (130.18 Hz)"
     assert found["C12"] == "1/2X, 1X, 3/2X: 1.4, 122, 4.3 µm"
     assert found["C51"].endswith("means -70, -48, -24 µm")
@@ -60,12 +60,11 @@ def test_a_case_that_diverged_fails_its_claims_and_one_not_computed_is_refused(s
     status = store["status"].copy()
     status[1] = DIVERGED
     with pytest.raises(CaseFailed, match="diverged"):
-        cases(store.assign(status=status))
-    (result,) = evaluate([BY_ID["C24"]], {"sixth_harmonic": store.assign(status=status)})
-    assert result.verdict == FAILS
+        SIXTH_HARMONIC.of({"sixth_harmonic": store.assign(status=status)})
+    assert BY_ID["C24"].evaluate({"sixth_harmonic": store.assign(status=status)}).verdict == FAILS
     status[1] = MISSING
     with pytest.raises(StoreError, match="make paper"):
-        cases(store.assign(status=status))
+        SIXTH_HARMONIC.of({"sixth_harmonic": store.assign(status=status)})
 
 
 TURN = 2 * np.pi * np.arange(400) / 400
@@ -88,7 +87,7 @@ def test_loops_are_counted(path, loops):
 
 
 def test_tilt_is_the_lean_of_the_long_axis(sound):
-    case = cases(sound["lateral_freedom"], speed_ratio=1.5, stator_1_lateral=0)
+    case = FREEDOM.but(speed_ratio=1.5, stator_1_lateral=0).of(sound)
     assert tilt(case) == pytest.approx(0, abs=1e-6)
     lean = math.radians(20)
     path = (case["vertical"] + 1j * case["horizontal"]) * np.exp(1j * lean)
@@ -96,8 +95,8 @@ def test_tilt_is_the_lean_of_the_long_axis(sound):
 
 
 def test_claims_are_found_by_their_figures():
-    assert figures_of(BY_ID["C17"]) == [6, 7]
-    assert figures_of(BY_ID["C01"]) == []
+    assert BY_ID["C17"].figures == [6, 7]
+    assert BY_ID["C01"].figures == []
     assert {c.id for c in on_figure(20)} == {"C70", "C71", "C72", "D6"}
     with pytest.raises(InputError, match="--figure 2: no claim on it"):
         on_figure(2)

@@ -13,8 +13,10 @@ import synthetic_paper
 from running import ROOT, run
 
 import rubhpc
-from postproc.mokhtar2017.claims.index import CLAIMS, FAILS, REPORTED, evaluate, open_studies
-from postproc.mokhtar2017.figures.index import FIGURES
+from postproc.mokhtar2017.claims.cases import open_studies
+from postproc.mokhtar2017.claims.claim import FAILS, REPORTED
+from postproc.mokhtar2017.claims.table import CLAIMS
+from postproc.mokhtar2017.figures.pages import FIGURES
 from rubhpc.rig.reading import read_rig
 from rubhpc.study.study import read_study
 
@@ -38,8 +40,9 @@ def simulated(tmp_path_factory) -> Path:
 
 def test_the_paper_comes_out_of_a_simulation(simulated):
     claims = [c for c in CLAIMS if set(c.studies) <= SIMULATED.keys() and c.id not in NOT_OF_THEM]
-    results = evaluate(claims, open_studies(simulated, SIMULATED))
-    assert {r.claim.id: r.finding.found for r in results if r.verdict == FAILS} == {}
+    stores = open_studies(simulated, SIMULATED)
+    results = [claim.evaluate(stores) for claim in claims]
+    assert {r.claim.id: r.found for r in results if r.verdict == FAILS} == {}
     assert len([r for r in results if r.verdict != REPORTED]) == 25
 
 

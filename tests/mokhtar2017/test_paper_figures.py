@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from synthetic_paper import SAMPLES
 
-from postproc.figures.style import house_style
-from postproc.mokhtar2017.figures.index import FIGURES, draw_figures
+from postproc.figures.drawing import house_style
+from postproc.mokhtar2017.figures.pages import FIGURES, draw_figures
 from postproc.mokhtar2017.figures.panels import between_contacts
 from rubhpc.errors import InputError
 
@@ -18,9 +18,8 @@ PANELS = {
 
 
 def drawn(number, stores):
-    figure = FIGURES[number]
     with house_style():
-        return figure.draw(*(stores[name] for name in figure.studies))
+        return FIGURES[number].of(stores)
 
 
 @pytest.mark.parametrize("number", FIGURES)

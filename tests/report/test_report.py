@@ -228,8 +228,7 @@ RINGS = {
 
 @pytest.mark.parametrize("kind", RINGS)
 def test_every_kind_of_stator_is_drawn(kind: str) -> None:
-    from postproc.report.end_view import end_view
-    from postproc.report.side_view import side_view
+    from postproc.report.rig_views import end_view, side_view
     from rubhpc.rig.stators import LumpedStator
 
     rig = read_rig("mokhtar2017")
@@ -247,8 +246,7 @@ def test_every_kind_of_stator_is_drawn(kind: str) -> None:
 @pytest.mark.parametrize(("count", "kind"), [(8, "circle"), (1, "path")])
 def test_a_carrier_is_drawn_on_its_springs(count: int, kind: str) -> None:
     """In place of the walls behind its stators; around the shaft where they are."""
-    from postproc.report.end_view import end_view
-    from postproc.report.side_view import side_view
+    from postproc.report.rig_views import end_view, side_view
     from rubhpc.rig.carriers import Carrier
 
     rig = read_rig("mokhtar2017")
@@ -264,8 +262,7 @@ def test_a_carrier_is_drawn_on_its_springs(count: int, kind: str) -> None:
 
 
 def test_a_rotor_of_matrices_is_reported_in_words() -> None:
-    from postproc.report.end_view import end_view
-    from postproc.report.side_view import description, side_view
+    from postproc.report.rig_views import description, end_view, side_view
     from rubhpc.rig.stators import LumpedStator
 
     stop = LumpedStator(node=1, mass=1e-4, stiffness=1e6, radius=1.0)

@@ -14,8 +14,16 @@ from hypothesis.extra.numpy import arrays
 from unpacking import unbent, unpacked_floats, unpacked_record
 
 from postproc.report.cases import Cases, spread
-from postproc.report.detail import FULL, LEVELS
-from postproc.report.packing import RATIOS, WAVE_STEPS, bends, pack_floats, quantised, quantised_spectrum
+from postproc.report.packing import (
+    FULL,
+    LEVELS,
+    RATIOS,
+    WAVE_STEPS,
+    bends,
+    pack_floats,
+    quantised,
+    quantised_spectrum,
+)
 from postproc.store.open import open_store
 
 if TYPE_CHECKING:

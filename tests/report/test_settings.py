@@ -3,7 +3,7 @@
 import json
 from dataclasses import asdict
 
-from postproc.report.settings import setting_rows
+from postproc.report.facts import setting_rows
 from rubhpc.study.drive_keys import DriveKeys
 from rubhpc.study.tables import Integrator, Recording
 
@@ -30,13 +30,10 @@ def test_numbers_have_the_units_of_their_keys():
     }
 
 
-def test_a_law_of_speed_is_read_point_by_point():
+def test_laws_are_read_point_by_point_and_lists_as_sentences():
     law = [[0.0, 31.41592653589793], [10.0, 314.1592653589793]]
     assert setting_rows({"run_up": {"law": law}}) == [("Run-up", "law 300 rpm at 0 s and 3000 rpm at 10 s")]
-
-
-def test_a_study_at_constant_speeds_keeps_what_it_says():
-    record = {"revolutions": 64, "keep": ["waveform", "spectrum"]}
+    record = {"revolutions": 64, "keep": ["waveform", "spectrum"]}  # at constant speeds
     assert setting_rows({"record": record}) == [("Record", "revolutions 64, keep waveform and spectrum")]
 
 

@@ -13,7 +13,7 @@ import pytest
 import xarray as xr
 from running import write_study
 
-from postproc.store.live import open_live
+from postproc.store.open import open_live
 from rubhpc import schema
 from rubhpc.running import worker
 from rubhpc.running.driver import run

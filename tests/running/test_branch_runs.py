@@ -13,10 +13,10 @@ from postproc.cases.reduction import reduce_store
 from postproc.figures.bifurcation import bifurcation
 from postproc.figures.branch_lines import events_at, mark_over_map, runs
 from postproc.figures.multipliers import at_edges, multipliers
+from postproc.report.budget import write_report
 from postproc.report.page import Page
 from postproc.store.case_table import case_table
-from postproc.store.live import open_live
-from postproc.store.open import open_store
+from postproc.store.open import open_live, open_store
 from rubhpc.errors import InputError
 from rubhpc.integrate.branches import case
 from rubhpc.running.plan import make_plan
@@ -110,7 +110,10 @@ def test_points_are_rows_of_a_table_and_have_quantiles(store):
 
 
 def test_report_has_the_branches_of_each_case(store):
-    page = Page(open_live(store / "branches.zarr")).html(values={})
+    written = store / "branches.html"
+    write_report(open_live(store / "branches.zarr"), written, 20e6)
+    page = written.read_text()
+    assert "all section points" in page
     assert page.count("data:image/png;base64,") == 4
     assert "Speed ratio r 0.74" in page
     assert "Speed ratio r 0.75" in page

@@ -11,8 +11,7 @@ from running import shards, stored_bytes, write_study
 from simulated_ranks import Simulation
 from stub_physics import Physics, record
 
-from postproc.store.live import open_live
-from postproc.store.open import open_store
+from postproc.store.open import open_live, open_store
 from rubhpc.errors import InputError, StoppedEarly
 from rubhpc.running import case_setup, driver, job, refining, worker
 from rubhpc.running.driver import run

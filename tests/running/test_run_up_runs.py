@@ -18,9 +18,8 @@ from postproc.figures.spectrum import spectrum
 from postproc.report.budget import write_report
 from postproc.signals.sections import section_of
 from postproc.signals.waveforms import waveform_data
-from postproc.store.case_table import write_table
-from postproc.store.live import open_live
-from postproc.store.revolution_table import revolution_table
+from postproc.store.case_table import revolution_table, write_table
+from postproc.store.open import open_live
 from rubhpc.errors import InputError, StoreError
 from rubhpc.running.plan import make_plan
 from rubhpc.running.recompute import reproduce
@@ -197,7 +196,7 @@ def test_revolutions_are_exported_as_rows(folder, tmp_path, kind):
 
 
 def test_a_report_shows_measures_and_pictures(folder, monkeypatch, tmp_path):
-    monkeypatch.setattr("postproc.report.run_ups.MOST_DRAWN", 1)
+    monkeypatch.setattr("postproc.report.pictures.MOST_DRAWN", 1)
     load = write_report(rubhpc.open(folder / "run_ups.zarr"), tmp_path / "report.html", 20e6)
     reported = "Of cases that change speed the page shows measures and pictures over their revolutions."
     assert load.notes == [reported]

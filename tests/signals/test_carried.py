@@ -7,10 +7,9 @@ import pytest
 import synthetic_store
 import xarray as xr
 
+from postproc.figures.drawing import house_style, new_figure
 from postproc.figures.orbit import draw_orbit
-from postproc.figures.style import house_style, new_figure
-from postproc.signals.carried import mean_shift
-from postproc.signals.waveforms import orbit_data
+from postproc.signals.waveforms import mean_shift, orbit_data
 from postproc.store.select import select
 from rubhpc import Carrier, read_rig
 

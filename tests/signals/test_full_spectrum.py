@@ -10,8 +10,8 @@ import xarray as xr
 from postproc.figures.cascade import cascade as cascade_figure
 from postproc.figures.cascade import intensity, waterfall
 from postproc.figures.cascade_lines import draw_frequencies, draw_orders
+from postproc.figures.drawing import house_style, new_figure
 from postproc.figures.spectrum import spectrum as spectrum_figure
-from postproc.figures.style import house_style, new_figure
 from postproc.signals.cascade import below, cascade, hold_peaks
 from postproc.signals.spectra import WHIRL, full_spectrum, spectrum_data
 from postproc.store.select import select
@@ -40,7 +40,7 @@ def line(spectrum, order):
 
 
 @pytest.mark.parametrize("tilt", np.linspace(0, math.pi, 5))
-@pytest.mark.parametrize(("long", "short"), [(3.0, 1.0), (2.0, 2.0), (1.0, 0.0), (3.0, -1.0)])
+@pytest.mark.parametrize(("long", "short"), [(3.0, 1.0), (2.0, 2.0), (1.0, 0.0), (3.0, -1.0), (1.0, -1.0)])
 def test_an_ellipse_is_a_forward_and_a_backward_circle(long, short, tilt):
     """Half axes a and b whirl as (a + b)/2 forward and (a - b)/2 backward, whatever the tilt."""
     revolution = np.arange(12 * N) / N

@@ -10,8 +10,8 @@ import xarray as xr
 from click.testing import CliRunner
 
 from postproc.catalogue import figures
+from postproc.figures.drawing import house_style, new_figure
 from postproc.figures.hht import draw_panels, energy_time_frequency, hht
-from postproc.figures.style import house_style, new_figure
 from postproc.signals.hilbert_huang import (
     analytic,
     contact_bandwidth,
@@ -71,6 +71,7 @@ def test_modes_do_not_depend_on_the_unit(size):
 @pytest.mark.parametrize("values", [np.zeros(100), np.linspace(0, 1, 100), np.ones(4)])
 def test_what_does_not_oscillate_has_no_mode(values):
     assert not empirical_modes(values).any()
+    assert np.isnan(analytic(values + 1.0, DT)).all()
 
 
 def test_a_chirp_has_its_frequency_at_every_instant():
@@ -101,12 +102,6 @@ def test_a_decaying_tone_keeps_its_frequency_whatever_its_phase(phase):
     assert amplitude[late] == pytest.approx(np.exp(-250 * t[late]), rel=0.15)
 
 
-def test_without_zeros_nothing_is_reported():
-    amplitude, frequency = analytic(np.linspace(1, 2, 50), DT)
-    assert np.isnan(amplitude).all()
-    assert np.isnan(frequency).all()
-
-
 def pushed_tone(t):
     """A free decay at 128 Hz from 4 ms in each revolution on; a push of another shape before that."""
     part = t % 0.04
@@ -124,7 +119,9 @@ def test_masked_contact_leaves_the_free_frequency():
     assert hht["span"].values.max() == 5
 
 
-def test_two_cycles_between_contacts_are_enough():
+def test_two_cycles_between_contacts_are_enough_and_without_contact_there_is_one_span():
+    hht = hilbert_huang(case(lambda t: np.cos(2 * math.pi * 25 * t)))
+    assert span_frequencies(hht).values == pytest.approx([25.0], rel=0.01)
     hht = hilbert_huang(case(lambda t: np.exp(-16 * (t % 0.0159)) * np.cos(804 * t), lambda turn: turn < 0.6))
     assert float(median_frequency(hht)) == pytest.approx(804 / (2 * math.pi), rel=0.03)
 
@@ -149,11 +146,6 @@ def test_noise_moves_the_median_frequency_little():
     modes = hilbert_huang(noisy, n_mode=8)
     strongest = int(np.argmax(modes["energy"].sum("sample").values)) + 1  # the noise takes the first ones
     assert float(median_frequency(modes, strongest)) == pytest.approx(128, rel=0.03)
-
-
-def test_a_case_that_never_touches_is_one_span():
-    hht = hilbert_huang(case(lambda t: np.cos(2 * math.pi * 25 * t)))
-    assert span_frequencies(hht).values == pytest.approx([25.0], rel=0.01)
 
 
 def test_the_picture_holds_the_energy():
@@ -191,7 +183,6 @@ def test_bad_arguments_are_refused(arguments, said):
 @pytest.mark.parametrize(
     ("speed_ratio", "clearance", "modulus", "band"),
     [
-        (0.75, "100 um", "3 GPa", (125, 131)),
         (0.75, "84 um", "3 GPa", (125, 131)),
         (3.0, "76 um", "3 GPa", (122, 134)),
         (2.0, "70 um", "30 GPa", (124, 132)),
@@ -241,14 +232,14 @@ def test_a_figure_without_oscillation_is_refused():
         energy_time_frequency(hht, ax)
 
 
-def test_no_median_of_nothing_is_given():
+@pytest.fixture
+def record():
     choice = {"speed_ratio": 1.5, "clearance": 84e-6, "friction": 0.3, "stator_youngs_modulus": 3e9}
-    assert hht(select(synthetic_store.make(), choice), mode=7).lines == ()
+    return select(synthetic_store.make(), choice)
 
 
-def test_a_motion_that_is_always_in_contact_is_shown_in_contact():
-    choice = {"speed_ratio": 1.5, "clearance": 84e-6, "friction": 0.3, "stator_youngs_modulus": 3e9}
-    record = select(synthetic_store.make(), choice)
+def test_a_motion_that_is_always_in_contact_is_shown_in_contact(record):
+    assert hht(record, mode=7).lines == ()  # no median of nothing
     record["contact_force"] = 1.0 + record["contact_force"]
     record["torsion"] = record["torsion"].copy(data=np.sin(8 * math.pi * record["revolution"].values))
     with pytest.raises(InputError, match=r"torsion is in contact throughout .*\(--contact kept\)"):
@@ -260,9 +251,7 @@ def test_a_motion_that_is_always_in_contact_is_shown_in_contact():
     drawing.show()
 
 
-def test_a_wall_has_no_natural_frequency_and_does_not_oscillate():
-    choice = {"speed_ratio": 1.5, "clearance": 84e-6, "friction": 0.3, "stator_youngs_modulus": 3e9}
-    record = select(synthetic_store.make(), choice)
+def test_a_wall_has_no_natural_frequency_and_does_not_oscillate(record):
     record["stator_lateral"] = 0.0 * record["stator_lateral"]
     record.attrs["rig"] = record.attrs["rig"] | {"stator": [{"node": 8, "rigid": True, "radius": 0.06}]}
     del record.attrs["study"]

@@ -10,8 +10,8 @@ from scipy.stats import norm
 
 from postproc.cases.detection import TOGETHER, area_under_curve, judge
 from postproc.catalogue import figures
+from postproc.figures.drawing import house_style, new_figure
 from postproc.figures.indicators import NAMES, draw_panels
-from postproc.figures.style import house_style, new_figure
 from postproc.signals.indicators import CHANNELS, INDICATORS, indicator_scores
 from rubhpc import read_rig, simulate
 from rubhpc.commands.figures import figure_command

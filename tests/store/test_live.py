@@ -15,7 +15,7 @@ import xarray as xr
 from running import write_study
 
 import rubhpc
-from postproc.store.live import open_live
+from postproc.store.open import open_live
 from rubhpc.errors import StoreError
 from rubhpc.schema import DONE
 from rubhpc.storage.runs import read_runs

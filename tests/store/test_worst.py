@@ -10,9 +10,8 @@ from postproc.cases.reduction import quantiles
 from postproc.cases.sensitivity import sensitivity
 from postproc.catalogue import figures
 from postproc.figures.map import map as map_of
-from postproc.store.select import narrow, select
+from postproc.store.select import narrow, select, worst_of_stators
 from postproc.store.units import caption
-from postproc.store.worst import worst_of_stators
 from rubhpc.commands.figures import figure_command
 from rubhpc.schema import VARIABLES
 

@@ -1,1 +1,1 @@
-"""What the paper claims, each claim a function of the stores of `jobs/paper`; `index` lists them all."""
+"""What the paper claims of its figures, checked on the stores of `jobs/paper`; `table` has the claims."""

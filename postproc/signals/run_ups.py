@@ -1,4 +1,4 @@
-"""Spectra during a run-up, over windows of a few revolutions, and the mean of every revolution."""
+"""Run-ups: spectra over windows of a few revolutions, mean positions, and the spin over the time."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from postproc.signals.spectra import WHIRL, check_signal
-from postproc.store.axes import source
+from postproc.store.axes import find_axis, source
 from postproc.store.run_ups import first_around, is_run_up
 from postproc.store.select import narrow
 from postproc.store.variables import require_variables
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 FEWEST = 8  # revolutions in which a spectrum separates 1X and 1/2X
 MEANS = 6  # revolutions, whole periods of 1/2X and 1/3X
+_PREFIX = "revolution_"
+_TORQUES = ("drive_work", "braking_torque")
 
 
 def run_up_spectra(
@@ -134,3 +136,43 @@ def _case(store: xr.Dataset, signals: Sequence[str]) -> tuple[xr.Dataset, int, i
     if not n:
         raise InputError(f"{source(store)}: this run-up has no whole revolution; select another case")
     return data, per_revolution, n
+
+
+def spin_over_time(store: xr.Dataset, over: str | None = None) -> xr.Dataset:
+    """Return the speed of every revolution, in its middle, and of a driven rotor the mean torques, loaded.
+
+    Parameters
+    ----------
+    store : Dataset
+        Of `rubhpc.run_up`, or a store of run-ups or driven rotors in which axes but `over` have been
+        selected.
+    over : str, optional
+        An axis along which the cases are to be kept.
+
+    Returns
+    -------
+    Dataset
+        `time` (s) and `speed` (rad/s), and where a drive turns the rotor `driving_torque` and
+        `braking_torque` (N m), over `revolution` and `over`; NaN beyond the last revolution of a case.
+
+    Raises
+    ------
+    InputError
+        The speed is constant, or several cases are left.
+    """
+    if not is_run_up(store):
+        raise InputError(f"{source(store)}: its speeds are constant; give a store with [run_up] or [drive]")
+    prefix = _PREFIX if _PREFIX + _TORQUES[1] in store else ""
+    is_driven = prefix + _TORQUES[1] in store
+    names = ["speed", "time", *([prefix + name for name in _TORQUES] if is_driven else [])]
+    if "status" in store:
+        store = narrow(store, names, [find_axis(store, over)] if over else [])
+    found = store[names].drop_vars(["order", "stator"], errors="ignore").load()
+    shown = found[["speed"]]
+    shown["time"] = found["time"] + math.pi / found["speed"]
+    shown["time"].attrs |= {"units": "s", "long_name": "time, in the middle of the revolution"}
+    if is_driven:
+        shown["driving_torque"] = found[prefix + _TORQUES[0]] / (2.0 * math.pi)
+        shown["driving_torque"].attrs |= {"units": "N m", "long_name": "mean torque of the drive"}
+        shown["braking_torque"] = found[prefix + _TORQUES[1]]
+    return shown
