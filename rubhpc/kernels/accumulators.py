@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, TORSION, Pairs, V, W, Workspace, rim_sense
 from rubhpc.kernels.force_average import add_force
 
@@ -18,7 +17,7 @@ Ints = NDArray[np.int64]
 VERTICAL, HORIZONTAL, TWIST, TWIST_ACCELERATION = range(4)
 
 
-class Samples(NamedTuple):
+class Samples(Struct):
     """Shaft-locked samples; the force is the mean over the interval that begins with the sample."""
 
     rotor: Floats  # (4, n_sample), m, m, rad, rad/s2
@@ -29,7 +28,7 @@ class Samples(NamedTuple):
     whole: Floats  # (4 + 3 q + n_probe, n_sample), the arrays above as rows, in this order
 
 
-class Accumulator(NamedTuple):
+class Accumulator(Struct):
     """Running sums and extrema over the recorded revolutions."""
 
     highest: Floats  # (3,), of vertical, horizontal and torsional displacement

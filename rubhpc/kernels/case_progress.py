@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from rubhpc.kernels._jit import jit_inline_sum
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.contact_pairs import rim_sense
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ MOST_STEPS = 50_000  # of one call: the caller checks for stop signals between c
 NONE = -1  # no contact mode wanted, no energies to add, no halving
 
 
-class Clock(NamedTuple):
+class Clock(Struct):  # made
     """Resolution and counting of time."""
 
     spin: float  # rad/s

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, jit_lean, jit_lean_sum, jit_part_sum
+from rubhpc.kernels._struct import Struct
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -26,7 +25,7 @@ STILL = 1e-3  # 1/s, size of an exponent up to which a coordinate has no primiti
 DYING = -1.0  # pace of a mode that has decayed before the first step after an event ends
 
 
-class ModeTables(NamedTuple):
+class ModeTables(Struct):
     """Modal form of every set of closed contacts met so far; complex arrays as (real, imaginary) pairs.
 
     p contact modes, m coordinates (padded), q pairs, n reduced degrees, o output rows. The coordinates are
@@ -67,7 +66,7 @@ class ModeTables(NamedTuple):
     steady_power: Floats  # (p, 2), W, of damping and of the unbalance, not contained in the forms
 
 
-class Reduced(NamedTuple):
+class Reduced(Struct):
     """The linear bodies in a basis in which the mass matrix is the identity."""
 
     stiffness: Floats  # (n, n)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit, jit_inline
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.laws import Law  # noqa: TC001 - part of a kernel's signature
 
 Floats = NDArray[np.float64]
@@ -18,7 +17,7 @@ V, W, TORSION, AXIAL, LATERAL = range(5)
 N_DEGREE = 5
 
 
-class Pairs(NamedTuple):
+class Pairs(Struct):
     """The q contact pairs of a case."""
 
     row: Ints  # (q, 5), row of each degree in the state; -1 where it is constrained or absent
@@ -34,7 +33,7 @@ class Pairs(NamedTuple):
     law: Law
 
 
-class Workspace(NamedTuple):
+class Workspace(Struct):
     """Arrays of one contact solution."""
 
     at: Floats  # (q, 5), displacement of each degree at the end of the step without forces, m or rad

@@ -10,12 +10,11 @@ the event-free intervals of `event_bounds` are found, and again once it no longe
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, short_loops
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.friction_states import OPEN, state_of
 
 Floats = NDArray[np.float64]
@@ -40,7 +39,7 @@ STATES, IS_LEARNED, TAKEN, WAITS, FAILED, LASTED, FEWEST, SPENT, IS_WEIGHED = ra
 )  # columns of `EarlierSpans.kept`
 
 
-class EarlierSpans(NamedTuple):
+class EarlierSpans(Struct):
     """Spans of s sets of states, m coordinates and q pairs; s is 0 where none are wanted."""
 
     # Of the span under way, (5,): role, place, tick where it began, bounds found in it, ticks compared

@@ -7,12 +7,11 @@ in some five pivots of a larger tableau, or finds that there are none.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline, jit_inline_sum, jit_lean
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.complementarity import UNSOLVED, solve_rows
 from rubhpc.kernels.contact_pairs import Workspace  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.coulomb_friction import ROUNDING, UNNOTICED, solve_cones
@@ -25,7 +24,7 @@ Floats = NDArray[np.float64]
 CLEARLY = 1e-9  # share by which expected forces are to be within the laws
 
 
-class FrictionWork(NamedTuple):
+class FrictionWork(Struct):
     """Work space of an event, q pairs."""
 
     solver: Workspace  # compliances are those of velocities, 1/kg

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum, jit_part_sum
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.case_progress import NONE
 from rubhpc.kernels.contact_modes import (
     FORCED_LEVEL,
@@ -27,7 +26,7 @@ MOST_REFINEMENTS = 30  # Newton steps to a root; two or three are usual
 SAME_TIME = 1e-14  # s, within which switch functions vanish together
 
 
-class PieceTables(NamedTuple):
+class PieceTables(Struct):
     """Tables of a contact mode to follow a piece: m coordinates, n reduced degrees, s switch functions."""
 
     switch_re: Floats  # (s, m), switch functions of the coordinates, real part of the product
@@ -50,7 +49,7 @@ class PieceTables(NamedTuple):
     displacement_limit: float  # m
 
 
-class PieceRoom(NamedTuple):
+class PieceRoom(Struct):
     """Work space of a piece."""
 
     switch: Floats  # (4, s), switch functions and their rates before and after a step

@@ -6,12 +6,11 @@ Spans are therefore kept until some are there, and measured mode by mode.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
 
 Floats = NDArray[np.float64]
@@ -29,7 +28,7 @@ BEFORE, AFTER, IMPULSE, MOST = range(4)  # columns of `Spans.force`
 VALUE, PRIMITIVE, STEADY, RAMP, EXCESS, RUBBED = range(6)
 
 
-class Spans(NamedTuple):
+class Spans(Struct):
     """Spans that are not measured yet, m coordinates, q pairs, and work space of measuring them."""
 
     noted: Ints  # (2,), of spans and at most of parts; the one that has begun, if any, is the next

@@ -6,12 +6,11 @@ force. This is a further bit per pair, after those of all states.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum
+from rubhpc.kernels._struct import Struct
 
 Floats = NDArray[np.float64]
 
@@ -20,7 +19,7 @@ MOST_PAIRS = 31  # whose states fit into an integer
 MOST_SOFT_PAIRS = 20  # likewise, with the bits of lifted pairs
 
 
-class FrictionBodies(NamedTuple):
+class FrictionBodies(Struct):
     """Properties of the reduced bodies for set-valued friction, q pairs."""
 
     sliding: Floats  # (q,), coefficient

@@ -6,11 +6,12 @@ CONTRIBUTING.md describes how to add one.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rubhpc.kernels._jit import jit_inline
+from rubhpc.kernels._struct import Struct
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,7 +24,7 @@ SLIDING, COULOMB, STRIBECK, TABLE = range(4)
 _NO_TABLE = np.zeros(0)
 
 
-class Law(NamedTuple):
+class Law(Struct):
     """Laws of a case; all fields but the first have the names of the keys of `[contact]`."""
 
     friction_law: int = SLIDING  # one of the numbers above

@@ -11,18 +11,17 @@ and C are banded throughout and stored by diagonals, as in `scipy.sparse.dia_arr
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline
+from rubhpc.kernels._struct import Struct
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-class Linear(NamedTuple):
+class Linear(Struct):
     """Blocks of the linear bodies; rows `start[b]:start[b + 1]` of a state vector are block b."""
 
     start: Ints  # (n_block + 1,)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.contact_modes import add_rows
 from rubhpc.kernels.mode_change import product
 from rubhpc.kernels.small_changes import add_rows_twice
@@ -21,7 +20,7 @@ NEUTRAL = 1e12  # times the energy of the first period, in all periods: what doe
 FIRST, LAST, BEGINS, ENDS = range(4)  # items of `Watched.parts`
 
 
-class Theory(NamedTuple):
+class Theory(Struct):
     """A monodromy matrix (m, m) of rank r, `M = sum over a of span[a] reading[a]^T`.
 
     After one period a distance d is in the space of the `span`, at `y = reading @ d`, and goes on by
@@ -142,7 +141,7 @@ def multiply(n: int, first: Floats, second: Floats, found: Floats) -> None:
         add_rows(second, first[n - 1, :n], found[n - 1, :n])
 
 
-class Watched(NamedTuple):
+class Watched(Struct):
     """Gaps and forces at t times of a periodic motion, in s parts, each of one function along a piece."""
 
     parts: Ints  # (s, 4), first time and that after the last, and whether it vanishes at each of these ends

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.accumulators import Accumulator
 from rubhpc.kernels.case_progress import LONG_AGO, NONE, Clock, Progress
 from rubhpc.kernels.contact_modes import DYING, ModeTables, Reduced, dot, enter, find_mode
@@ -27,7 +28,7 @@ TO_BEGIN, TO_ENTER, PART_TO_BEGIN, IN_PART = range(4)  # stages of a piece
 FAST, QUICK = 3.0, 0.5 * np.pi
 
 
-class Pieces(NamedTuple):
+class Pieces(Struct):
     """The k pieces with the same matrices and number of samples, in c parts each."""
 
     spin: Floats  # (k,), rad/s

@@ -6,12 +6,11 @@ them in closed form, and with the tick the exponentials.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit, jit_lean_sum
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.contact_modes import STILL, ModeTables
 from rubhpc.kernels.retuning_exponentials import retune_bounds, retune_outputs, retune_powers
 from rubhpc.kernels.retuning_laws import RimPart, Springs, follow_growth, move_rim, stretch_springs
@@ -23,7 +22,7 @@ Complexes = NDArray[np.complex128]
 STEADY = 1e-13  # sum of two exponents over the greatest, below which it is zero but for rounding
 
 
-class HeldMode(NamedTuple):
+class HeldMode(Struct):
     """What the spin speed leaves alone: m eigenmodes, m + 1 + q coordinates, padded to the tables' width.
 
     n reduced degrees, q pairs, o output rows.
@@ -51,7 +50,7 @@ class HeldMode(NamedTuple):
     varying: Varying
 
 
-class Speeds(NamedTuple):
+class Speeds(Struct):
     """Speeds to which tables are tuned, k of them, one after the other."""
 
     spin: Floats  # (k,), rad/s

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit
+from rubhpc.kernels._struct import Struct
 
 if TYPE_CHECKING:
     from rubhpc.kernels.contact_modes import ModeTables
@@ -17,7 +18,7 @@ Complexes = NDArray[np.complex128]
 NO_RIM = -1  # instead of a coordinate
 
 
-class RimPart(NamedTuple):
+class RimPart(Struct):
     """Part of a mode by the rim speed: the constant coordinate and growth, at the speed of the matrices.
 
     n reduced degrees, r switch functions, o output rows, tables of the width m.
@@ -39,7 +40,7 @@ class RimPart(NamedTuple):
     speed: Floats  # (g,), m/s
 
 
-class Springs(NamedTuple):
+class Springs(Struct):
     """The k pressed springs of a mode."""
 
     half: float  # N/m, of their stiffness

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_apart_sum, jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.accumulators import (
     HORIZONTAL,
     TWIST,
@@ -32,7 +31,7 @@ Floats = NDArray[np.float64]
 LANES = 8  # outputs are read in whole vectors
 
 
-class Recorder(NamedTuple):
+class Recorder(Struct):
     """Work space of a case's measures, for o output rows and q pairs; made by `recorder`."""
 
     value: Floats  # (SAMPLES_AT_ONCE o,), outputs sample by sample

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.accumulators import Accumulator  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.contact_modes import Reduced  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.elimination import eliminate
@@ -52,7 +51,7 @@ NEXT, BEST, N_PIECE, BEGINS, ENDS, ITERATION, TRIED, HAS_DERIVATIVE, IS_FRESH, C
 RESIDUAL, SHARE = range(2)  # items of `Search.share`
 
 
-class Search(NamedTuple):
+class Search(Struct):
     """A search under way; n reduced degrees."""
 
     now: Ints  # (11,)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_apart_sum, jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.contact_modes import Reduced, add_rows, find_mode
 from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.elimination import eliminate
@@ -23,7 +22,7 @@ NO_IMPULSE = 1e-12  # of the largest impulse of an event
 STOPPED = 1e-9  # of the rim's speed: what slips less after an impact sticks
 
 
-class ChangeRoom(NamedTuple):
+class ChangeRoom(Struct):
     """Work space for k small changes; m coordinates, n reduced degrees, q pairs."""
 
     z_re: Floats  # (m, k), their coordinates

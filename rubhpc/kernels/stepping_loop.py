@@ -9,12 +9,11 @@ stator's axis is a lower bound.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_lean_sum
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.accumulators import (
     DAMPING_LOSS,
     STEP,
@@ -39,7 +38,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-class ContactImpulses(NamedTuple):
+class ContactImpulses(Struct):
     """Action of contact forces on the modes of the open system; q pairs of 5 degrees each, m modes."""
 
     level: int  # steps in contact last 2^level ticks

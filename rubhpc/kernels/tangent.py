@@ -10,12 +10,11 @@ a contact mode.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.complementarity import solve_active
 from rubhpc.kernels.contact_modes import ModeTables, Reduced, add_rows, dot
 from rubhpc.kernels.coordinate_steps import floor_log2, turn_on
@@ -34,7 +33,7 @@ LOST = 1e-280  # a smaller displacement counts as zero
 PIECE, REVOLUTION, PASSED, IS_ENTERED = range(4)  # items of `Tangent.reached`
 
 
-class TrailModes(NamedTuple):
+class TrailModes(Struct):
     """The k distinct contact modes of a trail."""
 
     of_piece: Ints  # (room + 1,), contact mode of each piece
@@ -46,7 +45,7 @@ class TrailModes(NamedTuple):
     slips_evenly: bool  # whether a pair that sticks begins to slide with the friction that it has
 
 
-class Tangent(NamedTuple):
+class Tangent(Struct):
     """A displacement of a motion and work space; m coordinates, n reduced degrees, q pairs."""
 
     reached: Ints  # (4,), piece, revolution, ticks passed, whether the first mode is entered

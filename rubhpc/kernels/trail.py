@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_inline
+from rubhpc.kernels._struct import Struct
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -17,7 +16,7 @@ MOST_EVENTS = 2**14
 BROKEN = -1  # instead of the number of events: there was no room for all, or short steps between them
 
 
-class Trail(NamedTuple):
+class Trail(Struct):
     """Pieces of a motion; m modal coordinates, q pairs. Without room none are stored.
 
     Piece k + 1 begins where event k ends piece k.

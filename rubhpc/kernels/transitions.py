@@ -8,12 +8,11 @@ has tables of those transitions that it takes often, and goes by the motion (2 n
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_apart_sum, jit_inline_sum, jit_lean, short_loops
+from rubhpc.kernels._struct import Struct
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -26,7 +25,7 @@ DECAYED = 1e-60  # coordinates of less are taken for nothing
 GIVEN = 2  # rows of a pair: coordinates after a unit impulse, then a unit traction
 
 
-class Transitions(NamedTuple):
+class Transitions(Struct):
     """Transitions between p contact modes of m coordinates; p is 0 where none are wanted.
 
     Coordinates count from 0 to 2 m, real parts first. A transition is in `number`: how many coordinates stay

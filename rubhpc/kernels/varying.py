@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.contact_modes import STILL
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ Complexes = NDArray[np.complex128]
 Ints = NDArray[np.int64]
 
 
-class Course(NamedTuple):
+class Course(Struct):
     """Entries of an array that go with the speed and with its acceleration, k of them."""
 
     at: Ints  # (k,), in the array, flat
@@ -26,7 +27,7 @@ class Course(NamedTuple):
     rise: Floats  # (k,), factors of the place of the acceleration
 
 
-class Varying(NamedTuple):
+class Varying(Struct):
     """What of a mode goes with the speed; none of it where matrices are held."""
 
     kept: Floats  # (s,), the memory of what `HeldMode` has of it
