@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.ahead import compile_ahead
 from rubhpc.integrate.closed_form_case import exponents_of, give_back, judge_of, trail_of
 from rubhpc.integrate.compilation import (
     COMMON,
@@ -117,7 +116,6 @@ def run_case(
     """
     n_whole = recording.longest_transient + recording.revolutions
     began = time.perf_counter() - seconds_compiling()
-    compile_ahead(setup)
     if isinstance(initial, State):
         state = fit_to_gaps(initial, setup, clearance)
     else:

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import struct
 from array import array
-from collections.abc import Iterable, Iterator
 from inspect import Parameter, Signature
-from typing import Any, Self, dataclass_transform
+from typing import TYPE_CHECKING, Any, Self, dataclass_transform
 
 import numba
 import numpy as np
@@ -30,10 +29,13 @@ from numba.extending import (
 )
 from numba.np.arrayobj import populate_array
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
 _WORD = ir.IntType(64)
 
 
-class StructType(types.Type):  # type: ignore[misc]
+class StructType(types.Type):
     """Numba's type of a `Struct`: its class, and the types of its fields."""
 
     def __init__(self, of: type[Struct], kinds: tuple[types.Type, ...]) -> None:
@@ -44,26 +46,26 @@ class StructType(types.Type):  # type: ignore[misc]
         self.n_word = sum(sizes)
 
 
+register_model(StructType)(models.OpaqueModel)
+
+
 def _short(kind: types.Type) -> str:
-    """Name of a field's type; those of the functions that take it contain it."""
+    """Name of a field's type, as part of the names of all functions that take the struct."""
     if not isinstance(kind, types.Array):
         return str(kind)
     return f"{kind.dtype}:{kind.ndim}{kind.layout}{'' if kind.mutable else 'r'}"
-
-
-register_model(StructType)(models.OpaqueModel)
 
 
 @dataclass_transform(frozen_default=True)
 class Struct:
     """Base of what kernels receive by reference: arrays, numbers and other structs, which stay as they are.
 
-    The contents of arrays may change. A subclass declares its fields as a `NamedTuple` does.
+    The contents of the arrays may change. A subclass declares its fields as a `NamedTuple` does. Kernels may make
+    one from the values of all fields in order; it lasts as long as the function that made it.
     """
 
     _fields: tuple[str, ...]
     _defaults: dict[str, Any]
-    invariant = True
 
     def __init_subclass__(cls) -> None:
         cls._fields = tuple(cls.__annotations__)
@@ -97,37 +99,45 @@ class Struct:
 
     @property
     def _numba_type_(self) -> StructType:
-        found = self.__dict__.get("_type")
-        if found is None:
-            found = self.__dict__["_type"] = _type_of(type(self), tuple(map(_kind_key, self)), tuple(self))
-        return found  # type: ignore[no-any-return]
+        """Its type, which numba asks for at each call."""
+        if "_type" not in self.__dict__:
+            self.__dict__["_type"] = _type_of(self)
+        found: StructType = self.__dict__["_type"]
+        return found
 
     @property
     def _address(self) -> int:
-        words = self.__dict__.get("_words")
-        if words is None:
-            words = self.__dict__["_words"] = array("q", [w for value in self for w in _words_of(value)])
-        return words.buffer_info()[0]  # type: ignore[no-any-return]
+        """Address of its words, which last as long as it does."""
+        if "_words" not in self.__dict__:
+            self.__dict__["_words"] = array("q", [word for value in self for word in _words_of(value)])
+        words: array[int] = self.__dict__["_words"]
+        return words.buffer_info()[0]
 
 
-_types: dict[Any, StructType] = {}
+_types: dict[Any, StructType] = {}  # known, by classes and kinds of values: numba takes 3 us for each array
 
 
-def _kind_key(value: Any) -> Any:
-    if isinstance(value, np.ndarray):
-        return value.dtype, value.ndim, value.flags.c_contiguous, value.flags.writeable
-    return value._numba_type_ if isinstance(value, Struct) else type(value)
-
-
-def _type_of(of: type[Struct], keys: tuple[Any, ...], values: tuple[Any, ...]) -> StructType:
-    found = _types.get((of, keys))
-    if found is None:
-        kinds = tuple(numba.typeof(value) for value in values)
-        for name, kind in zip(of._fields, kinds, strict=True):
+def _type_of(held: Struct) -> StructType:
+    key = type(held), tuple(map(_kind_of, held))
+    if key not in _types:
+        kinds = tuple(map(numba.typeof, held))
+        for name, kind in zip(held._fields, kinds, strict=True):
             if not isinstance(kind, (types.Array, types.Float, types.Integer, types.Boolean, StructType)):
-                raise TypeError(f"{of.__name__}.{name} is {kind}, not an array, a number or a struct")
-        found = _types[of, keys] = StructType(of, kinds)
-    return found
+                raise TypeError(f"{type(held).__name__}.{name} is {kind}: no array, number or struct")
+        _types[key] = StructType(type(held), kinds)
+    return _types[key]
+
+
+def _kind_of(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return (
+            value.dtype,
+            value.ndim,
+            value.flags.c_contiguous,
+            value.flags.f_contiguous,
+            value.flags.writeable,
+        )
+    return value._numba_type_ if isinstance(value, Struct) else type(value)
 
 
 def _words_of(value: Any) -> tuple[int, ...]:
@@ -135,7 +145,7 @@ def _words_of(value: Any) -> tuple[int, ...]:
         return (value.ctypes.data, *value.shape, *value.strides)
     if isinstance(value, Struct):
         return (value._address,)
-    if isinstance(value, (float, np.floating)):
+    if isinstance(value, float | np.floating):
         return struct.unpack("q", struct.pack("d", value))
     return (int(value),)
 
@@ -149,11 +159,11 @@ def _unbox(typ: StructType, held: Any, c: Any) -> NativeValue:
 
 
 @infer_getattr
-class _Fields(AttributeTemplate):  # type: ignore[misc]
+class _Fields(AttributeTemplate):
     key = StructType
 
-    def generic_resolve(self, typ: StructType, name: str) -> Any:
-        return typ.kinds.get(name)
+    def generic_resolve(self, value: StructType, attr: str) -> Any:
+        return value.kinds.get(attr)
 
 
 @lower_getattr_generic(StructType)
@@ -161,27 +171,20 @@ def _read(context: Any, builder: Any, typ: StructType, value: Any, name: str) ->
     kind, place = typ.kinds[name], typ.place[name]
     words = builder.bitcast(value, _WORD.as_pointer())
 
-    def load(i: int, as_type: Any = None) -> Any:
-        at = builder.gep(words, [_WORD(place + i)])
-        if as_type is not None:
-            at = builder.bitcast(at, as_type.as_pointer())
-        found = builder.load(at)
-        if typ.of.invariant:
-            found.set_metadata("invariant.load", builder.module.add_metadata([]))
-        return found
+    def load(i: int, of: Any) -> Any:
+        return builder.load(builder.bitcast(builder.gep(words, [_WORD(place + i)]), of.as_pointer()))
 
-    as_value = context.get_value_type(kind)
     if isinstance(kind, types.Boolean):
-        return builder.icmp_signed("!=", load(0), _WORD(0))
+        return builder.icmp_signed("!=", load(0, _WORD), _WORD(0))
     if not isinstance(kind, types.Array):
-        return load(0, as_value)
-    n, item = kind.ndim, context.get_data_type(kind.dtype)
+        return load(0, context.get_value_type(kind))
     made = context.make_array(kind)(context, builder)
+    item = context.get_data_type(kind.dtype)
     populate_array(
         made,
         data=load(0, item.as_pointer()),
-        shape=[load(1 + i) for i in range(n)],
-        strides=[load(1 + n + i) for i in range(n)],
+        shape=[load(1 + i, _WORD) for i in range(kind.ndim)],
+        strides=[load(1 + kind.ndim + i, _WORD) for i in range(kind.ndim)],
         itemsize=context.get_constant(types.intp, context.get_abi_sizeof(item)),
         meminfo=None,
     )
@@ -189,10 +192,10 @@ def _read(context: Any, builder: Any, typ: StructType, value: Any, name: str) ->
 
 
 def _define_constructor(cls: type[Struct]) -> None:
-    """Let kernels make a struct, which lasts as long as the function that makes it."""
+    """Let kernels make a struct, in the frame of the function that does."""
 
-    @type_callable(cls)
-    def _type(context: Any) -> Any:
+    @type_callable(cls)  # type: ignore[untyped-decorator]
+    def _typer(context: Any) -> Any:
         def typed(*args: types.Type) -> StructType:
             return StructType(cls, tuple(map(types.unliteral, args)))
 
@@ -200,31 +203,24 @@ def _define_constructor(cls: type[Struct]) -> None:
         typed.__signature__ = Signature(names)  # type: ignore[attr-defined]
         return typed
 
-    @lower_builtin(cls, types.VarArg(types.Any))
+    @lower_builtin(cls, types.VarArg(types.Any))  # type: ignore[untyped-decorator]
     def _make(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         typ = sig.return_type
-        entry = builder.goto_entry_block()
-        with entry:
+        with builder.goto_entry_block():
             words = builder.alloca(_WORD, size=_WORD(typ.n_word))
-        for (name, kind), given, value in zip(typ.kinds.items(), sig.args, args, strict=True):
-            place = typ.place[name]
-            value = context.cast(builder, value, given, kind)
-
-            def store(i: int, what: Any) -> None:
-                at = builder.gep(words, [_WORD(place + i)])
-                builder.store(what, builder.bitcast(at, what.type.as_pointer()))
-
+        for (name, kind), given, arg in zip(typ.kinds.items(), sig.args, args, strict=True):
+            value = context.cast(builder, arg, given, kind)
             if isinstance(kind, types.Array):
-                made = context.make_array(kind)(context, builder, value)
-                store(0, made.data)
-                for i, size in enumerate([*_unpack(builder, made.shape), *_unpack(builder, made.strides)]):
-                    store(1 + i, size)
-            elif isinstance(kind, types.Boolean):
-                store(0, builder.zext(value, _WORD))
+                held = context.make_array(kind)(context, builder, value)
+                sizes = [
+                    builder.extract_value(of, i)
+                    for of in (held.shape, held.strides)
+                    for i in range(kind.ndim)
+                ]
+                filled = [held.data, *sizes]
             else:
-                store(0, value)
+                filled = [builder.zext(value, _WORD) if isinstance(kind, types.Boolean) else value]
+            for i, word in enumerate(filled):
+                at = builder.gep(words, [_WORD(typ.place[name] + i)])
+                builder.store(word, builder.bitcast(at, word.type.as_pointer()))
         return builder.bitcast(words, context.get_value_type(typ))
-
-
-def _unpack(builder: Any, tuple_: Any) -> list[Any]:
-    return [builder.extract_value(tuple_, i) for i in range(tuple_.type.count)]

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from rubhpc.kernels._jit import jit_inline_sum
+from rubhpc.kernels._jit import jit_sum
 from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.contact_pairs import rim_sense
 
@@ -101,14 +101,14 @@ def closed_pairs(progress: Progress, tables: ModeTables) -> int:
     return int(tables.mask[progress.mode])
 
 
-@jit_inline_sum
+@jit_sum
 def shaft_angle(clock: Clock, tick: int) -> float:
     """Angle of the shaft at a tick, rad, counted from the beginning of its revolution."""
     ticks_per_revolution = clock.samples_per_revolution << clock.sample_level
     return rim_sense(clock.spin) * 2.0 * np.pi * (tick % ticks_per_revolution) / ticks_per_revolution
 
 
-@jit_inline_sum
+@jit_sum
 def shaft_turn(clock: Clock, tick: int, after: float = 0.0) -> tuple[float, float]:
     """Cosine and sine of the shaft's angle a time `after` (s) a tick, times the growth of the unbalance."""
     angle = shaft_angle(clock, tick) + clock.spin * after

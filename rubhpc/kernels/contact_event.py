@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_part_sum
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.case_progress import CONTACT_UNSOLVED, DIVERGED, UNDER_WAY, Clock, Progress, shaft_turn
 from rubhpc.kernels.contact_modes import FORCED_LEVEL, ModeTables, Reduced
@@ -51,7 +51,7 @@ def event_work(q: int) -> EventWork:
     )
 
 
-@jit_part_sum
+@linked_sum
 def begin_mode(
     tables: ModeTables,
     reduced: Reduced,
@@ -79,7 +79,7 @@ def begin_mode(
     return is_entered
 
 
-@jit_part_sum
+@linked_sum
 def take_event(
     tables: ModeTables,
     reduced: Reduced,

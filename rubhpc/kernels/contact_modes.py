@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean, jit_lean_sum, jit_part_sum
+from rubhpc.kernels._jit import jit_sum, linked, linked_sum
 from rubhpc.kernels._struct import Struct
 
 Floats = NDArray[np.float64]
@@ -89,7 +89,7 @@ class Reduced(Struct):
     overlap: float  # m, of an open pair that parts, up to which it continues without an event
 
 
-@jit_lean_sum
+@linked_sum
 def dot(re: Floats, im: Floats, z_re: Floats, z_im: Floats) -> float:
     """Real part of a row's product with the modal coordinates."""
     total = 0.0
@@ -98,7 +98,7 @@ def dot(re: Floats, im: Floats, z_re: Floats, z_im: Floats) -> float:
     return total
 
 
-@jit_inline_sum
+@linked_sum
 def bounded(weight: Floats, z_re: Floats, z_im: Floats) -> float:
     """Bound on a second derivative: weighted sum of the modes' magnitudes."""
     total = 0.0
@@ -107,7 +107,7 @@ def bounded(weight: Floats, z_re: Floats, z_im: Floats) -> float:
     return total
 
 
-@jit_inline_sum
+@linked_sum
 def propagate(re: Floats, im: Floats, z_re: Floats, z_im: Floats, next_re: Floats, next_im: Floats) -> None:
     """Modal coordinates after a tabulated step."""
     for k in range(z_re.size):
@@ -116,7 +116,7 @@ def propagate(re: Floats, im: Floats, z_re: Floats, z_im: Floats, next_re: Float
         next_im[k] = re[k] * b + im[k] * a
 
 
-@jit_lean
+@linked
 def add_rows(rows: Floats, value: Floats, target: Floats) -> None:
     """Add the rows (n, m), times the values (n,), to the target (m,), four at a time, in order."""
     n_whole = value.size - value.size % 4
@@ -136,7 +136,7 @@ def add_rows(rows: Floats, value: Floats, target: Floats) -> None:
             target[k] += last[k] * a
 
 
-@jit_lean_sum
+@jit_sum
 def enter_with(
     n_eigenmode: int,
     enter_re: Floats,
@@ -170,7 +170,7 @@ def enter_with(
         z[0, n_eigenmode + 1 + i], z[1, n_eigenmode + 1 + i] = clearance[i], 0.0
 
 
-@jit_part_sum
+@linked_sum
 def enter(
     tables: ModeTables, mode: int, clearance: Floats, cosine: float, sine: float, motion: Floats, z: Floats
 ) -> None:
@@ -190,7 +190,7 @@ def enter(
     )
 
 
-@jit_lean_sum
+@linked_sum
 def enter_rest(
     motion_re: Floats,
     motion_im: Floats,
@@ -211,7 +211,7 @@ def enter_rest(
     add_rows(enter_im, motion, z[1])
 
 
-@jit_lean_sum
+@linked_sum
 def find_mode(mask: Ints, wanted: int) -> int:
     """Index of the mode with the wanted set of closed pairs; -1 where it is not tabulated yet."""
     for mode in range(mask.size):
@@ -220,7 +220,7 @@ def find_mode(mask: Ints, wanted: int) -> int:
     return -1
 
 
-@jit_inline_sum
+@linked_sum
 def positive_interval(s: float, rate: float, bound: float) -> float:
     """Time, s, in which a switch function stays positive: `s + s' t - b t^2 / 2 > 0`."""
     if not s > 0.0:
@@ -230,7 +230,7 @@ def positive_interval(s: float, rate: float, bound: float) -> float:
     return -s / rate if rate < 0.0 else np.inf
 
 
-@jit_inline_sum
+@linked_sum
 def event_free_interval(
     switch_re: Floats,
     switch_im: Floats,
@@ -250,7 +250,7 @@ def event_free_interval(
     return proved
 
 
-@jit_inline_sum
+@linked_sum
 def resolved_time(re: Floats, im: Floats, pace: Floats, least: float, z_re: Floats, z_im: Floats) -> float:
     """Time, s, over which Hermite's cubic follows a signal with these rows (m,) to 1e-4 of its size.
 
@@ -266,7 +266,7 @@ def resolved_time(re: Floats, im: Floats, pace: Floats, least: float, z_re: Floa
     return float((RESOLVED * size / bend) ** 0.25) if bend > 0.0 else np.inf
 
 
-@jit_lean_sum
+@jit_sum
 def is_within(
     motion: Floats,
     translations: Floats,
@@ -301,7 +301,7 @@ def is_within(
     return bool(0.5 * twice <= energy_limit)
 
 
-@jit_inline_sum
+@linked_sum
 def is_beyond(reduced: Reduced, displacement: Floats) -> bool:
     """Whether reduced displacements, the first n of a motion, pass the limit or are NaN."""
     for row in range(reduced.translations.shape[0]):

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels._struct import Struct
 
 Floats = NDArray[np.float64]
@@ -221,7 +221,7 @@ def curved_work(q: int, n_row: int, n: int, m: int, n_loss: int, n_level: int) -
     )
 
 
-@jit_inline_sum
+@linked_sum
 def is_closed(mask: int, i: int) -> bool:
     """Whether pair i is closed."""
     return (mask >> i) & 1 == 1

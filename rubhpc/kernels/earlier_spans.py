@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, short_loops
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.friction_states import OPEN, state_of
 
@@ -92,20 +92,20 @@ def forget_earlier(earlier: EarlierSpans) -> None:
     earlier.now[ROLE], earlier.kept[:, STATES] = IDLE, -1
 
 
-@jit_inline_sum
+@linked_sum
 def go_on_without(earlier: EarlierSpans) -> None:
     """Go on in the middle of a span: it is not compared. One that has not begun may be."""
     if earlier.now[ROLE] != AWAITED:
         earlier.now[ROLE] = IDLE
 
 
-@jit_inline_sum
+@linked_sum
 def is_watched(states: int, j: int) -> bool:
     """Whether switch function j of a set of states is one: an open pair has one alone."""
     return j % 2 == 0 or state_of(states, j // 2) != OPEN
 
 
-@jit_inline_sum
+@linked_sum
 def begin_bounds(
     earlier: EarlierSpans,
     states: int,
@@ -152,8 +152,7 @@ def begin_bounds(
     return False
 
 
-@jit_inline_sum
-@short_loops
+@linked_sum
 def learn(earlier: EarlierSpans, power_re: Floats, power_im: Floats, z_re: Floats, z_im: Floats) -> None:
     """Begin a span that later ones are compared with."""
     place, last = earlier.now[PLACE], power_re.shape[0] - 1
@@ -167,8 +166,7 @@ def learn(earlier: EarlierSpans, power_re: Floats, power_im: Floats, z_re: Float
     earlier.n_interval[place, :] = 0
 
 
-@jit_inline_sum
-@short_loops
+@linked_sum
 def weigh(
     earlier: EarlierSpans, rows: tuple[Floats, Floats, Floats, Floats], pace: Floats, time: float, m: int
 ) -> None:
@@ -194,8 +192,7 @@ def weigh(
             slow[2, i], slow[3, i] = turning_re[j, k], turning_im[j, k]
 
 
-@jit_inline_sum
-@short_loops
+@linked_sum
 def compare(earlier: EarlierSpans, states: int, time: float, z_re: Floats, z_im: Floats) -> None:
     """Fill what the switch functions may differ by from those of the earlier span over a time, s."""
     place, m = earlier.now[PLACE], z_re.size
@@ -220,7 +217,7 @@ def compare(earlier: EarlierSpans, states: int, time: float, z_re: Floats, z_im:
             earlier.apart[j] = apart + abs(value) + abs(rate) * time
 
 
-@jit_inline_sum
+@linked_sum
 def known_until(earlier: EarlierSpans, j: int, tick: int) -> int:
     """Tick until which switch function j is positive, that is so until a tick; by the earlier span."""
     now = earlier.now
@@ -233,7 +230,7 @@ def known_until(earlier: EarlierSpans, j: int, tick: int) -> int:
     return int(begin + until)
 
 
-@jit_inline_sum
+@linked_sum
 def note_interval(earlier: EarlierSpans, j: int, begin: int, end: int, most: int, margin: float) -> None:
     """Note that switch function j stays above a margin from one tick to another one, within `most` ticks."""
     place, entered = earlier.now[PLACE], earlier.now[ENTERED]
@@ -245,7 +242,7 @@ def note_interval(earlier: EarlierSpans, j: int, begin: int, end: int, most: int
         earlier.n_interval[place, j] = i + 1
 
 
-@jit_inline_sum
+@linked_sum
 def end_bounds(earlier: EarlierSpans, states: int, tick: int) -> None:
     """End the span under way by an event, and see whether what it was compared with still serves."""
     now = earlier.now

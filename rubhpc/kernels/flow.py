@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum, jit_part_sum
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.case_progress import NONE
 from rubhpc.kernels.contact_modes import (
@@ -65,7 +65,7 @@ def piece_room(n_switch: int, width: int) -> PieceRoom:
 BEFORE, RATE_BEGUN, RATE_ENDED, GRADIENT = range(4)  # rows of the motions of a piece
 
 
-@jit_part_sum
+@linked_sum
 def follow_piece(
     tables: PieceTables,
     room: PieceRoom,
@@ -155,7 +155,7 @@ def follow_piece(
     return time, crossing
 
 
-@jit_inline_sum
+@linked_sum
 def next_event(
     tables: PieceTables,
     room: PieceRoom,
@@ -236,7 +236,7 @@ def next_event(
         halving = max(halving - 1, NONE)
 
 
-@jit_lean_sum
+@linked_sum
 def read_switches(
     switch_re: Floats,
     switch_im: Floats,
@@ -254,7 +254,7 @@ def read_switches(
             rate[j] = dot(rate_re[j], rate_im[j], z[0], z[1])
 
 
-@jit_inline_sum
+@linked_sum
 def below(value: Floats, floor: Floats) -> int:
     """Bits of the switch functions below their floors."""
     crossing = int(np.int64(0))  # no literal: callers are compiled for one type
@@ -264,7 +264,7 @@ def below(value: Floats, floor: Floats) -> int:
     return crossing
 
 
-@jit_lean_sum
+@linked_sum
 def move(exponent: Floats, drift: Floats, time: float, z_entered: Floats, z: Floats) -> None:
     """Coordinates (2, m) a time (s) after `z_entered`."""
     for k in range(z.shape[1]):
@@ -275,7 +275,7 @@ def move(exponent: Floats, drift: Floats, time: float, z_entered: Floats, z: Flo
         z[1, k] = re * z_entered[1, k] + im * z_entered[0, k]
 
 
-@jit_lean_sum
+@linked_sum
 def refine(
     tables: PieceTables,
     roots: Floats,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline, jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import jit_sum, linked, linked_sum
 from rubhpc.kernels.accumulators import PRESSING, Accumulator
 from rubhpc.kernels.complementarity import UNSOLVED
 from rubhpc.kernels.contact_modes import Reduced  # noqa: TC001 - part of a kernel's signature
@@ -29,7 +29,7 @@ Floats = NDArray[np.float64]
 LEAVING = 1e-3  # of the cone, within which friction is a tick before it is outside
 
 
-@jit_lean_sum
+@jit_sum
 def change_states(
     reduced: Reduced,
     bodies: FrictionBodies,
@@ -59,7 +59,7 @@ def change_states(
     return found
 
 
-@jit_inline_sum
+@linked_sum
 def change_seen(
     reduced: Reduced,
     bodies: FrictionBodies,
@@ -108,7 +108,7 @@ def change_seen(
     return remaining
 
 
-@jit_inline
+@linked
 def state_by_forces(solver: Workspace, i: int, leaves: bool) -> int:
     """State in which closed pair i goes on, by its forces: within its cone it sticks.
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum, short_loops
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.accumulators import DAMPING_LOSS, UNBALANCE_WORK, Accumulator
 from rubhpc.kernels.case_progress import NONE, Clock, Progress, shaft_turn
 from rubhpc.kernels.contact_modes import ModeTables, Reduced, add_rows, dot, enter_rest, find_mode
@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 LANES = 8  # coordinates are used in whole vectors
 
 
-@jit_inline_sum
+@linked_sum
 def used_width(tables: ModeTables, mode: int) -> int:
     """How many coordinates of a contact mode are used, in whole vectors; those behind them are zero.
 
@@ -31,8 +31,7 @@ def used_width(tables: ModeTables, mode: int) -> int:
     return int(min((used + LANES - 1) // LANES * LANES, tables.switch_re.shape[2]))
 
 
-@jit_inline_sum
-@short_loops
+@linked_sum
 def enter_states(
     tables: ModeTables, reduced: Reduced, clock: Clock, progress: Progress, motion: Floats, z: Floats
 ) -> bool:
@@ -74,7 +73,7 @@ def enter_states(
     return True
 
 
-@jit_inline_sum
+@linked_sum
 def begin_states(
     tables: ModeTables,
     mode: int,
@@ -93,8 +92,7 @@ def begin_states(
     progress.contact_age, progress.halving_level, progress.is_after_event = NONE, NONE, 1
 
 
-@jit_inline_sum
-@short_loops
+@linked_sum
 def leave_states(tables: ModeTables, mode: int, z: Floats, motion: Floats) -> None:
     """Fill the reduced motion (2 n,) from the coordinates (2, m) of a contact mode."""
     used = used_width(tables, mode)
@@ -115,7 +113,7 @@ def leave_states(tables: ModeTables, mode: int, z: Floats, motion: Floats) -> No
         motion[row] = dot(re[row], im[row], z_re, z_im)
 
 
-@jit_lean_sum
+@linked_sum
 def energies_gained(tables: ModeTables, mode: int, begun: Floats, z: Floats, gained: Floats) -> None:
     """Fill `gained` (2,), J, with damping loss and unbalance work between coordinates (2, m) of a mode.
 
@@ -158,7 +156,7 @@ def energies_gained(tables: ModeTables, mode: int, begun: Floats, z: Floats, gai
     gained[0] = loss
 
 
-@jit_inline_sum
+@linked_sum
 def work_form(tables: ModeTables, mode: int, z_re: Floats, z_im: Floats) -> float:
     """What grows by the work of the unbalance, J."""
     first = tables.n_eigenmode[mode]
@@ -174,7 +172,7 @@ def work_form(tables: ModeTables, mode: int, z_re: Floats, z_im: Floats) -> floa
     return work
 
 
-@jit_inline_sum
+@linked_sum
 def add_energies(
     tables: ModeTables,
     mode: int,

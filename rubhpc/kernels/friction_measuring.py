@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_part_sum
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.accumulators import observe_force
 from rubhpc.kernels.case_progress import Clock, Progress  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE, ModeTables
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
-@jit_part_sum
+@linked_sum
 def observe_spans(
     tables: ModeTables,
     bodies: FrictionBodies,
@@ -115,7 +115,7 @@ def observe_spans(
     forget_spans(spans)
 
 
-@jit_inline_sum
+@linked_sum
 def watch_samples(clock: Clock, n_sample: int, recorder: Recorder, accumulator: Accumulator) -> None:
     """Widen the extrema by the samples of the spans."""
     n_row, interval = recorder.value.size // SAMPLES_AT_ONCE, clock.tick * (1 << clock.sample_level)
@@ -131,7 +131,7 @@ def watch_samples(clock: Clock, n_sample: int, recorder: Recorder, accumulator: 
         )
 
 
-@jit_inline_sum
+@linked_sum
 def observe_parts(
     tables: ModeTables,
     bodies: FrictionBodies,
@@ -218,7 +218,7 @@ def observe_parts(
         read_noted(transitions, mode, n_noted, used, n_row, first_sample, spans, samples)
 
 
-@jit_inline_sum
+@linked_sum
 def copy_used(used: int, z: Floats, target: Floats) -> None:
     """Copy the coordinates (2, m) that are used."""
     for part in range(2):

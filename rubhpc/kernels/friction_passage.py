@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
     DIVERGED,
@@ -46,7 +46,7 @@ Floats = NDArray[np.float64]
 MOST_EVENTS = 65536  # in a revolution; more are left to short steps
 
 
-@jit_inline_sum
+@linked_sum
 def take_change(
     tables: ModeTables,
     reduced: Reduced,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_part_sum
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.case_progress import FINISHED, Clock, Progress
 from rubhpc.kernels.friction_loop import advance_with_friction
 from rubhpc.kernels.sections_loop import note_section
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
-@jit_part_sum
+@linked_sum
 def advance_friction_sections(
     tables: ModeTables,
     reduced: Reduced,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline
+from rubhpc.kernels._jit import linked
 from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
 
@@ -85,19 +85,19 @@ def whole_rows(n_row: int) -> int:
     return -(-n_row // ROWS_AT_ONCE) * ROWS_AT_ONCE
 
 
-@jit_inline
+@linked
 def begin_span(spans: Spans, z: Floats) -> None:
     """Note the coordinates (2, m) with which a span begins."""
     copy_coordinates(z, spans.begun[spans.noted[0]])
 
 
-@jit_inline
+@linked
 def has_room(spans: Spans, n_part: int) -> bool:
     """Whether there is room for the span that has begun, and as many parts of it."""
     return bool(spans.noted[0] < spans.mode.size and spans.noted[1] + n_part <= spans.force.shape[0])
 
 
-@jit_inline
+@linked
 def note_span(spans: Spans, mode: int, begin: int, end: int, n_part: int, z: Floats) -> None:
     """Keep the span that has begun, from one tick to another one, where it has the coordinates (2, m)."""
     k = spans.noted[0]
@@ -108,20 +108,20 @@ def note_span(spans: Spans, mode: int, begin: int, end: int, n_part: int, z: Flo
     spans.noted[0], spans.noted[1] = k + 1, spans.noted[1] + n_part
 
 
-@jit_inline
+@linked
 def note_impulse(spans: Spans, i: int, impulse: float) -> None:
     """Keep what pair i got by the event that has ended the last span, N s."""
     spans.given[spans.noted[0] - 1, i] = impulse
 
 
-@jit_inline
+@linked
 def forget_spans(spans: Spans) -> None:
     """Make room: all but the one that may have begun are measured."""
     copy_coordinates(spans.begun[spans.noted[0]], spans.begun[0])
     spans.noted[0] = spans.noted[1] = 0
 
 
-@jit_inline
+@linked
 def copy_coordinates(z: Floats, target: Floats) -> None:
     """Copy coordinates (2, m)."""
     for part in range(2):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import jit_sum, linked_sum
 from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.contact_modes import add_rows
 from rubhpc.kernels.mode_change import product
@@ -33,7 +33,7 @@ class Theory(Struct):
     sums: Floats  # (r, r), S: energies of all periods to come are y' S y
 
 
-@jit_lean_sum
+@jit_sum
 def fill_theory(monodromy: Floats, scale: Floats, energy: Floats, rooms: Floats) -> tuple[int, bool]:
     """Fill in the theory of a monodromy matrix (m, m): its rank, and whether disturbances decay.
 
@@ -83,7 +83,7 @@ def fill_theory(monodromy: Floats, scale: Floats, energy: Floats, rooms: Floats)
     return rank, is_stable
 
 
-@jit_lean_sum
+@linked_sum
 def find_span(
     monodromy: Floats, scale: Floats, span: Floats, reading: Floats, scaled: Floats, left: Floats
 ) -> int:
@@ -129,7 +129,7 @@ def find_span(
     return rank
 
 
-@jit_inline_sum
+@linked_sum
 def multiply(n: int, first: Floats, second: Floats, found: Floats) -> None:
     """Product of the leading (n, n) parts of two matrices."""
     for i in range(n):
@@ -150,7 +150,7 @@ class Watched(Struct):
     onward: Floats  # (r, t), by y
 
 
-@jit_lean_sum
+@jit_sum
 def keeps_contacts(
     theory: Theory, watched: Watched, apart: Floats, n_period: int, least: float, work: Floats
 ) -> bool:
@@ -198,7 +198,7 @@ def keeps_contacts(
     return True
 
 
-@jit_inline_sum
+@linked_sum
 def is_kept(value: Floats, begins: bool, ends: bool) -> bool:
     """Whether values along a piece are positive, but for times by the ends where the function vanishes."""
     n = value.size

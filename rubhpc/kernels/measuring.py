@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum, jit_part_sum
+from rubhpc.kernels._jit import jit_sum, linked_sum
 from rubhpc.kernels.accumulators import (
     DAMPING_LOSS,
     UNBALANCE_WORK,
@@ -31,7 +31,7 @@ Ints = NDArray[np.int64]
 FORCE, FORCE_RATE, SLIP, SLIP_RATE = range(4)  # rows of `Recorder.node`
 
 
-@jit_inline_sum
+@linked_sum
 def read_contact(
     tables: ModeTables, reduced: Reduced, mode: int, i: int, z_re: Floats, z_im: Floats
 ) -> tuple[float, float, float, float]:
@@ -44,7 +44,7 @@ def read_contact(
     )
 
 
-@jit_inline_sum
+@linked_sum
 def resolved_contact(tables: ModeTables, mode: int, z_re: Floats, z_im: Floats) -> float:
     """Time, s, over which cubics follow force and slip of the pairs closed in contact mode `mode`."""
     time = np.inf
@@ -59,7 +59,7 @@ def resolved_contact(tables: ModeTables, mode: int, z_re: Floats, z_im: Floats) 
     return time
 
 
-@jit_inline_sum
+@linked_sum
 def leave_out_dying(pace: Floats, z: Floats, calm: Floats) -> None:
     """Fill `calm` (2, m) with the coordinates that outlast the first step: no cubic follows the others."""
     for k in range(z.shape[1]):
@@ -67,7 +67,7 @@ def leave_out_dying(pace: Floats, z: Floats, calm: Floats) -> None:
         calm[0, k], calm[1, k] = (0.0, 0.0) if dies else (z[0, k], z[1, k])
 
 
-@jit_inline_sum
+@linked_sum
 def force_in_step(
     before: float, rate_before: float, after: float, rate_after: float, step: float
 ) -> tuple[float, float]:
@@ -77,7 +77,7 @@ def force_in_step(
     return impulse, 0.5 * (before + after) + 0.125 * bend
 
 
-@jit_inline_sum
+@linked_sum
 def begin_contact(
     tables: ModeTables, reduced: Reduced, mode: int, z: Floats, calm: Floats, recorder: Recorder
 ) -> None:
@@ -93,7 +93,7 @@ def begin_contact(
             recorder.node[SLIP, i], recorder.node[SLIP_RATE, i] = slip, slip_rate
 
 
-@jit_inline_sum
+@linked_sum
 def observe_step(
     tables: ModeTables,
     reduced: Reduced,
@@ -140,7 +140,7 @@ def observe_step(
         accumulator.energy[DAMPING_LOSS] += drive - friction_work
 
 
-@jit_lean_sum
+@linked_sum
 def energy_forms(
     loss_form: Floats, work_re: Floats, work_im: Floats, first: int, mode: int, z: Floats, entry: Floats
 ) -> None:
@@ -173,7 +173,7 @@ def energy_forms(
     entry[0], entry[1] = loss, work
 
 
-@jit_part_sum
+@jit_sum
 def end_span(
     tables: ModeTables,
     clock: Clock,
@@ -198,7 +198,7 @@ def end_span(
     progress.energy_from = NONE
 
 
-@jit_inline_sum
+@linked_sum
 def begin_span(tables: ModeTables, z: Floats, progress: Progress, recorder: Recorder) -> None:
     """Begin to add energies at the current tick, in the current contact mode."""
     mode = progress.mode

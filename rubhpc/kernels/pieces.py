@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import inlined, linked_sum
 from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.accumulators import Accumulator
 from rubhpc.kernels.case_progress import LONG_AGO, NONE, Clock, Progress
@@ -76,7 +76,7 @@ NO_PIECES = Pieces(
 )
 
 
-@jit_inline_sum
+@inlined
 def clock_of(clock: Clock, pieces: Pieces, piece: int) -> Clock:
     """Clock of a piece, from that of any other."""
     return Clock(
@@ -91,7 +91,7 @@ def clock_of(clock: Clock, pieces: Pieces, piece: int) -> Clock:
     )
 
 
-@jit_inline_sum
+@linked_sum
 def start_piece(reduced: Reduced, pieces: Pieces, piece: int, recorder: Recorder, samples: Samples) -> None:
     """Set unbalance and rims to the speed of a piece, and clear the arrays for its samples."""
     for k in range(reduced.force_cosine.size):
@@ -106,7 +106,7 @@ def start_piece(reduced: Reduced, pieces: Pieces, piece: int, recorder: Recorder
             samples.whole[row, j] = 0.0
 
 
-@jit_inline_sum
+@linked_sum
 def end_piece(pieces: Pieces, piece: int, n_step: int, standing: int, z: Floats, samples: Samples) -> None:
     """Store the samples of a piece and continue with the next."""
     pieces.n_step[piece] = n_step
@@ -121,14 +121,14 @@ def end_piece(pieces: Pieces, piece: int, n_step: int, standing: int, z: Floats,
     pieces.at[PIECE], pieces.at[STAGE] = piece + 1, TO_BEGIN
 
 
-@jit_inline_sum
+@linked_sum
 def set_masks(mask: Ints, table: Ints, n_room: int, piece: int) -> None:
     """Enable only the tables that are tuned to a piece."""
     for place in range(mask.size):
         mask[place] = table[place] if place % n_room == piece % n_room else NONE
 
 
-@jit_lean_sum
+@linked_sum
 def begin_piece(
     tables: ModeTables,
     reduced: Reduced,
@@ -161,14 +161,14 @@ def begin_piece(
     return True
 
 
-@jit_lean_sum
+@linked_sum
 def read_motion(tables: ModeTables, mode: int, z: Floats, motion: Floats) -> None:
     """Fill in the reduced motion (2 n,) of coordinates (2, m)."""
     for row in range(motion.size):
         motion[row] = dot(tables.motion_re[mode, row], tables.motion_im[mode, row], z[0], z[1])
 
 
-@jit_inline_sum
+@linked_sum
 def begin_part(part: Accumulator, before: Accumulator, since: float, closed: int) -> None:
     """Continue from the sums before, whose clock began `since` (s) ago; pairs of `closed` are touching."""
     q, n_row, n = part.force_piece.shape
@@ -184,7 +184,7 @@ def begin_part(part: Accumulator, before: Accumulator, since: float, closed: int
         part.is_touching[i] = (closed >> i) & 1 == 1
 
 
-@jit_inline_sum
+@inlined
 def row_of(sums: Accumulator, i: int) -> Accumulator:
     """The sums of one part."""
     return Accumulator(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_apart_sum, jit_inline_sum
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.friction_spans import AT_ONCE
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-@jit_inline_sum
+@linked_sum
 def forms_gained(
     transitions: Transitions, place: int, spans: Spans, which: Ints, count: int, m: int, gained: Floats
 ) -> None:
@@ -51,7 +51,7 @@ def forms_gained(
         place += size
 
 
-@jit_apart_sum
+@linked_sum
 def add_products(rows: Floats, size: int, count: int, change: Floats, total: Floats, gained: Floats) -> None:
     """Add products of a block (size size,) with changes and sums (count size,) to `gained`.
 

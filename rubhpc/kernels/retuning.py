@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit, jit_lean_sum
+from rubhpc.kernels._jit import jit, linked, linked_sum
 from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.contact_modes import STILL, ModeTables
 from rubhpc.kernels.retuning_exponentials import retune_bounds, retune_outputs, retune_powers
@@ -84,7 +84,7 @@ def retune(tables: ModeTables, place: int, held: HeldMode, speeds: Speeds, first
         )
 
 
-@jit
+@linked
 def retune_to(
     tables: ModeTables,
     mode: int,
@@ -167,7 +167,7 @@ def retune_to(
         stretch_springs(tables, mode, held.springs, m, held.rim.one)
 
 
-@jit_lean_sum
+@linked_sum
 def _respond(re: Floats, im: Floats, shares: Floats, moved: Floats) -> None:
     """Response (2, 3 n), real and imaginary part, but for its last third.
 
@@ -182,7 +182,7 @@ def _respond(re: Floats, im: Floats, shares: Floats, moved: Floats) -> None:
         moved[0, a], moved[1, a] = real, imaginary
 
 
-@jit_lean_sum
+@linked_sum
 def _look(rows: Floats, moved: Floats, seen: Floats) -> None:
     """What r rows (r, c) see of a response (2, c), real and imaginary part."""
     for i in range(rows.shape[0]):
@@ -193,7 +193,7 @@ def _look(rows: Floats, moved: Floats, seen: Floats) -> None:
         seen[0, i], seen[1, i] = real, imaginary
 
 
-@jit
+@linked
 def _retune_energies(tables: ModeTables, mode: int, held: HeldMode, x: Complexes, factor: complex) -> None:
     """Forms of the energies with the response `x` (2 n,)."""
     m, n, width = held.is_pair.size, held.slip.shape[1], held.exponent.size
@@ -246,7 +246,7 @@ def _retune_energies(tables: ModeTables, mode: int, held: HeldMode, x: Complexes
         tables.work_re[mode, 1, k], tables.work_im[mode, 1, k] = second.real, second.imag
 
 
-@jit
+@linked
 def _primitive(power: complex, exponent: complex, least: float) -> complex:
     """Power over its exponent, 1/s; zero where that is zero."""
     return power / exponent if abs(exponent) > least else 0j

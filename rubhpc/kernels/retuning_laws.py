@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit
+from rubhpc.kernels._jit import linked
 from rubhpc.kernels._struct import Struct
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class Springs(Struct):
     overlap: Floats  # (k, 2 m), gaps by coordinates; those proportional to the speed are filled in
 
 
-@jit
+@linked
 def move_rim(
     tables: ModeTables,
     mode: int,
@@ -88,7 +88,7 @@ def move_rim(
     work[0, one], work[1, one] = share * rim.work[0], share * rim.work[1]
 
 
-@jit
+@linked
 def follow_growth(
     tables: ModeTables,
     mode: int,
@@ -124,7 +124,7 @@ def follow_growth(
         loss[there, here] += added
 
 
-@jit
+@linked
 def stretch_springs(tables: ModeTables, mode: int, springs: Springs, first: int, one: int) -> None:
     """Add the energy of springs by the response, the coordinate `first`, and by the rim speed."""
     n_spring, n = springs.gap.shape

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_lean_sum
+from rubhpc.kernels._jit import jit_sum
 from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.accumulators import Accumulator  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.contact_modes import Reduced, find_mode
@@ -71,7 +71,7 @@ def piece_rows(k: int, width: int, n_switch: int, q: int) -> PieceRows:
     )
 
 
-@jit_lean_sum
+@jit_sum
 def follow_revolutions(
     modes: PieceModes,
     reduced: Reduced,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_apart_sum, jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.accumulators import (
     HORIZONTAL,
@@ -53,7 +53,7 @@ def recorder(q: int, n_probe: int = 0) -> Recorder:
     )
 
 
-@jit_inline_sum
+@linked_sum
 def read_outputs(output: Floats, mode: int, z_re: Floats, z_im: Floats, n_value: int, value: Floats) -> None:
     """Fill the first `n_value` outputs from the modal coordinates; their number is a multiple of four.
 
@@ -78,7 +78,7 @@ def read_outputs(output: Floats, mode: int, z_re: Floats, z_im: Floats, n_value:
                 )
 
 
-@jit_inline_sum
+@linked_sum
 def take_samples(
     tables: ModeTables,
     mode: int,
@@ -119,7 +119,7 @@ def take_samples(
     )
 
 
-@jit_apart_sum
+@linked_sum
 def read_samples(
     output: Floats,
     mode: int,
@@ -139,7 +139,7 @@ def read_samples(
     store_samples(value, n_row, first, count, rotor, axial, lateral, probe)
 
 
-@jit_inline_sum
+@linked_sum
 def store_samples(
     value: Floats,
     n_row: int,
@@ -167,7 +167,7 @@ def store_samples(
             probe[i, first + j] = value[start + first_probe + i]
 
 
-@jit_lean_sum
+@linked_sum
 def widen_extrema(
     value: Floats,
     count: int,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import jit_sum, linked_sum
 from rubhpc.kernels.case_progress import FINISHED, Clock, Progress
 from rubhpc.kernels.contact_modes import ModeTables, Reduced, dot, is_within
 from rubhpc.kernels.event_loop import advance
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
-@jit_lean_sum
+@jit_sum
 def advance_sections(
     tables: ModeTables,
     reduced: Reduced,
@@ -79,7 +79,7 @@ def advance_sections(
     return FINISHED
 
 
-@jit_inline_sum
+@linked_sum
 def note_section(
     motion_re: Floats,
     motion_im: Floats,

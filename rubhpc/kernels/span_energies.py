@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.accumulators import DAMPING_LOSS, UNBALANCE_WORK, observe_rub
 from rubhpc.kernels.friction_coordinates import add_energies, used_width, work_form
 from rubhpc.kernels.friction_spans import AT_ONCE, RUBBED
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
-@jit_inline_sum
+@linked_sum
 def add_losses(
     tables: ModeTables,
     clock: Clock,
@@ -68,7 +68,7 @@ def add_losses(
                 add_energies(tables, mode, time, begun, ended, recorder, accumulator)
 
 
-@jit_inline_sum
+@linked_sum
 def add_rubs(
     tables: ModeTables,
     bodies: FrictionBodies,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_apart_sum, jit_inline_sum, short_loops
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
 from rubhpc.kernels.friction_spans import ROWS_AT_ONCE
 from rubhpc.kernels.sampling import store_samples
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
-@jit_inline_sum
+@linked_sum
 def read_noted(
     transitions: Transitions,
     mode: int,
@@ -43,8 +43,7 @@ def read_noted(
             spans.value[place + r] = value[r]
 
 
-@jit_apart_sum
-@short_loops
+@linked_sum
 def read_rows(rows: Floats, width: int, used: int, m: int, point: Floats, count: int, value: Floats) -> None:
     """Fill `value` (n_point width,) with output rows (width 2 m,) at `count` points, two or one more.
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_lean_sum
+from rubhpc.kernels._jit import jit_sum, linked_sum
 from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.accumulators import (
     DAMPING_LOSS,
@@ -55,7 +55,7 @@ class ContactImpulses(Struct):
     probe_response: Floats  # (n_probe, 5 q), immediate reading of an acceleration probe for a unit force
 
 
-@jit_lean_sum
+@linked_sum
 def book_step(
     reduced: Reduced,
     skew: Floats,
@@ -93,7 +93,7 @@ def book_step(
     energy[UNBALANCE_WORK] += gain
 
 
-@jit_lean_sum
+@linked_sum
 def take_back(
     impulses: ContactImpulses,
     work: Workspace,
@@ -120,7 +120,7 @@ def take_back(
         now[a] += moved
 
 
-@jit_lean_sum
+@jit_sum
 def advance_by_steps(
     tables: ModeTables,
     reduced: Reduced,

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_apart_sum, jit_inline_sum, jit_lean, short_loops
+from rubhpc.kernels._jit import linked, linked_sum
 from rubhpc.kernels._struct import Struct
 
 Floats = NDArray[np.float64]
@@ -49,8 +49,7 @@ _NONE, _EMPTY, _ROOM = np.zeros((0, 0), dtype=np.int64), np.zeros(0, dtype=np.in
 NO_TRANSITIONS = Transitions(_NONE, _EMPTY, _EMPTY, _EMPTY, _NONE, _EMPTY, _ROOM, _ROOM, _ROOM)
 
 
-@jit_inline_sum
-@short_loops
+@linked_sum
 def is_far(transitions: Transitions, mode: int, q: int, m: int, limit: float, z: Floats) -> bool:
     """Whether coordinates (2, m) of a mode may take the rotor beyond the limit, m: by the sizes of all."""
     reach = transitions.value[transitions.mode[mode] + 2 * (SEEN + GIVEN) * q * m :]
@@ -60,8 +59,7 @@ def is_far(transitions: Transitions, mode: int, q: int, m: int, limit: float, z:
     return not most <= limit
 
 
-@jit_inline_sum
-@short_loops
+@linked_sum
 def see(
     transitions: Transitions, mode: int, m: int, i: int, used: int, z: Floats
 ) -> tuple[float, float, float, float]:
@@ -80,8 +78,7 @@ def see(
     return a, b, c, d
 
 
-@jit_lean
-@short_loops
+@linked
 def add_impulses(transitions: Transitions, mode: int, q: int, m: int, given: Floats, z: Floats) -> None:
     """Add impulses and tractions (2, q), N s, to the coordinates (2, m) of the mode that goes on."""
     place = transitions.mode[mode] + 2 * SEEN * q * m
@@ -95,8 +92,7 @@ def add_impulses(transitions: Transitions, mode: int, q: int, m: int, given: Flo
                         z[part, k] += share * row[k]
 
 
-@jit_lean
-@short_loops
+@linked
 def pass_over(transitions: Transitions, place: int, m: int, z: Floats, after: Floats) -> None:
     """Fill the coordinates `after` (2, m) in the next mode, but for those that do not move, from `z`."""
     number, source, target = transitions.number, transitions.source, transitions.target
@@ -122,8 +118,7 @@ def pass_over(transitions: Transitions, place: int, m: int, z: Floats, after: Fl
         place += n_target
 
 
-@jit_apart_sum
-@short_loops
+@linked_sum
 def pass_block(rows: Floats, n_row: int, width: int, value: Floats, total: Floats) -> None:
     """Fill `total` (width,) with rows (n_row width,) times coordinates `value` (n_row,), eight at a time.
 

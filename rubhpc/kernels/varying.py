@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit
+from rubhpc.kernels._jit import jit, linked
 from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.contact_modes import STILL
 
@@ -66,7 +66,7 @@ def take_course(course: Course, place: float, rise: float, values: Floats) -> No
         values[at[j]] = total + rise * risen[j]
 
 
-@jit
+@linked
 def vary(tables: ModeTables, mode: int, varying: Varying, place: float, rise: float) -> None:
     """Bring a mode and its tables to a place in the range, but for what follows from these."""
     take_course(varying.kept_shape, place, rise, varying.kept)
@@ -82,7 +82,7 @@ def vary(tables: ModeTables, mode: int, varying: Varying, place: float, rise: fl
     take_course(varying.enter_constant, place, rise, tables.enter_constant[mode].reshape(-1))
 
 
-@jit
+@linked
 def vary_rates(tables: ModeTables, mode: int, exponent: Complexes, n_eigenmode: int) -> None:
     """Rates of what eigenmodes make of switch functions and slip, as their exponents are."""
     inverse = np.zeros(n_eigenmode if tables.primitive_re.shape[1] > 0 else 0, dtype=np.complex128)

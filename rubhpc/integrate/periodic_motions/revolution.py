@@ -95,7 +95,7 @@ class Revolution:
         rows = self.rows
         return [
             _piece(stride, *row)
-            for row in zip(rows.states.tolist(), rows.times.tolist(), *rows[2:], strict=True)
+            for row in zip(rows.states.tolist(), rows.times.tolist(), *tuple(rows)[2:], strict=True)
         ]
 
 
