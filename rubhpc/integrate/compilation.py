@@ -41,8 +41,8 @@ _expected: set[str] = set()  # sets of the study that is run
 class _Compilation(event.Listener):
     """Listens to numba, which takes its lock, looks in the cache, and compiles what is not there.
 
-    Meanwhile this process has the lock of the cache. The others wait and load what it has compiled. Two at once
-    could write one file of the cache for different arguments.
+    Meanwhile this process has the lock of the cache. The others wait and load what it has compiled. Two at
+    once could write one file of the cache for different arguments.
     """
 
     def __init__(self) -> None:

@@ -1,9 +1,9 @@
 """The one place that reaches into numba: what only kernels call gets no machine code of its own.
 
-Numba optimises a function when it is compiled and again in each caller into which it is linked, and generates
-machine code and a Python wrapper for it each time. Here it is optimised with the kernel that calls it, and
-nothing else. `RUBHPC_PLAIN_NUMBA=1` switches this off, and so does a version of numba with which it has not been
-tried: compilation takes longer, and results are the same to rounding.
+Numba optimises a function when it is compiled and again in each caller into which it is linked, and
+generates machine code and a Python wrapper for it each time. Here it is optimised with the kernel that calls
+it, and nothing else. `RUBHPC_PLAIN_NUMBA=1` switches this off, and so does a version of numba with which it has
+not been tried: compilation takes longer, and results are the same to rounding.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Structs of arrays and numbers that kernels receive by reference.
 
-Numba passes a named tuple by value: one of 30 arrays is 300 words at every call. A `Struct` is one pointer, to
-words that Python has filled in: the address, shape and strides of an array, or a number. Python owns the
+Numba passes a named tuple by value: one of 30 arrays is 300 words at every call. A `Struct` is one pointer,
+to words that Python has filled in: the address, shape and strides of an array, or a number. Python owns the
 arrays, so kernels count no references to them.
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 import struct
 from array import array
 from inspect import Parameter, Signature
+from itertools import product
 from typing import TYPE_CHECKING, Any, Self, dataclass_transform
 
 import numba
@@ -60,8 +61,8 @@ def _short(kind: types.Type) -> str:
 class Struct:
     """Base of what kernels receive by reference: arrays, numbers and other structs, which stay as they are.
 
-    The contents of the arrays may change. A subclass declares its fields as a `NamedTuple` does. Kernels may make
-    one from the values of all fields in order; it lasts as long as the function that made it.
+    The contents of the arrays may change. A subclass declares its fields as a `NamedTuple` does. Kernels may
+    make one from the values of all fields in order; it lasts as long as the function that made it.
     """
 
     _fields: tuple[str, ...]
@@ -162,7 +163,7 @@ def _unbox(typ: StructType, held: Any, c: Any) -> NativeValue:
 class _Fields(AttributeTemplate):
     key = StructType
 
-    def generic_resolve(self, value: StructType, attr: str) -> Any:
+    def generic_resolve(self, value: StructType, attr: str) -> Any:  # type: ignore[override]
         return value.kinds.get(attr)
 
 
@@ -194,7 +195,7 @@ def _read(context: Any, builder: Any, typ: StructType, value: Any, name: str) ->
 def _define_constructor(cls: type[Struct]) -> None:
     """Let kernels make a struct, in the frame of the function that does."""
 
-    @type_callable(cls)  # type: ignore[untyped-decorator]
+    @type_callable(cls)
     def _typer(context: Any) -> Any:
         def typed(*args: types.Type) -> StructType:
             return StructType(cls, tuple(map(types.unliteral, args)))
@@ -203,7 +204,7 @@ def _define_constructor(cls: type[Struct]) -> None:
         typed.__signature__ = Signature(names)  # type: ignore[attr-defined]
         return typed
 
-    @lower_builtin(cls, types.VarArg(types.Any))  # type: ignore[untyped-decorator]
+    @lower_builtin(cls, types.VarArg(types.Any))
     def _make(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         typ = sig.return_type
         with builder.goto_entry_block():
