@@ -62,7 +62,7 @@ class Struct:
     """Base of what kernels receive by reference: arrays, numbers and other structs, which stay as they are.
 
     The contents of the arrays may change. A subclass declares its fields as a `NamedTuple` does. Kernels may
-    make one from the values of all fields in order; it lasts as long as the function that made it.
+    make one from the values of all fields; it lasts as long as the function that made it.
     """
 
     _fields: tuple[str, ...]
@@ -197,8 +197,9 @@ def _define_constructor(cls: type[Struct]) -> None:
 
     @type_callable(cls)
     def _typer(context: Any) -> Any:
-        def typed(*args: types.Type) -> StructType:
-            return StructType(cls, tuple(map(types.unliteral, args)))
+        def typed(*args: types.Type, **kwargs: types.Type) -> StructType:
+            values = dict(zip(cls._fields, args, strict=False)) | kwargs
+            return StructType(cls, tuple(types.unliteral(values[name]) for name in cls._fields))
 
         names = [Parameter(name, Parameter.POSITIONAL_OR_KEYWORD) for name in cls._fields]
         typed.__signature__ = Signature(names)  # type: ignore[attr-defined]

@@ -51,7 +51,7 @@ def test_arrays_of_any_layout():
 
 @numba.njit
 def make(table, count):
-    held = Outer(Inner(table, count, 0.25, False), table[1])
+    held = Outer(row=table[1], inner=Inner(table, count, is_open=False, size=0.25))
     return read(held), held.row[0]
 
 
