@@ -28,6 +28,7 @@ from rubhpc.threads import VARIABLES
 COMMANDS = {
     "run": ("rubhpc.commands.run:run", "Run or resume a study; the word run may be omitted."),
     "plan": ("rubhpc.commands.run:plan", "Cases, bytes, files, core-hours; done, failed and missing cases."),
+    "compile": ("rubhpc.commands.run:compile_kernels", "Compile the kernels of a study, before a large job."),
     "status": ("rubhpc.commands.run:status", "Progress and failures, also during a run."),
     "verify": ("rubhpc.commands.run:verify", "Check every stored case against its checksum."),
     "modes": (

@@ -10,7 +10,6 @@ from __future__ import annotations
 import struct
 from array import array
 from inspect import Parameter, Signature
-from itertools import product
 from typing import TYPE_CHECKING, Any, Self, dataclass_transform
 
 import numba

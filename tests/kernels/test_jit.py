@@ -49,7 +49,7 @@ def probe(tmp_path):
     (kernels / "caller.py").write_text(CALLER)
 
     def start(value, flavour="jit", **variables):
-        """It prints its result, whether that came from the cache, and how often it announced a compilation."""
+        """It prints its result, whether that came from the cache, and the number of announcements."""
         (kernels / "callee.py").write_text(CALLEE.format(value=value, flavour=flavour))
         return subprocess.Popen(
             [sys.executable, "-P", "-c", "import rubhpc.kernels.caller"],

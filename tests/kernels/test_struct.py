@@ -78,10 +78,10 @@ def test_what_is_missing_or_too_much(args):
 
 def test_it_stays_as_it_is():
     """What Python would change, a kernel would not see."""
-    with pytest.raises(AttributeError, match="Outer.row cannot be changed; use _replace"):
+    with pytest.raises(AttributeError, match=r"Outer\.row cannot be changed; use _replace"):
         Outer(None, None).row = np.zeros(1)  # type: ignore[misc]
 
 
 def test_what_is_no_number_is_refused():
-    with pytest.raises(TypeError, match="Outer.row is .*: no array, number or struct"):
+    with pytest.raises(TypeError, match=r"Outer\.row is .*: no array, number or struct"):
         read(Outer(Inner(np.zeros((2, 3)), 0, 0.0), "text"))
