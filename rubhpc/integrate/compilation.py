@@ -22,7 +22,7 @@ STEPS, PERIODIC = "for contact in short steps", "for periodic motions"
 RUN_UPS = "for run-ups"
 NEIGHBOURS = "for neighbouring motions, which distinguish chaos from order"
 # Sets of kernels, each announced, and compiled when a case first needs it -> seconds that it takes, about.
-_SECONDS = {COMMON: 10, STICK: 70, CURVED: 70, STEPS: 10, PERIODIC: 10, RUN_UPS: 10, NEIGHBOURS: 10}
+_SECONDS = {COMMON: 10, STICK: 30, CURVED: 70, STEPS: 10, PERIODIC: 10, RUN_UPS: 10, NEIGHBOURS: 10}
 _SETS = {  # kernel -> its set; all others are common
     "advance_friction": STICK,
     "change_states": STICK,
@@ -62,7 +62,7 @@ class _Compilation(event.Listener):
             dispatcher = event.data["dispatcher"]
             if dispatcher.__module__.startswith("rubhpc.kernels."):
                 self._is_compiling = True
-                self._announce_set_of(dispatcher.__name__)
+                self.announce_set_of(dispatcher.__name__)
             return
         with self._own:
             self._depth += 1
@@ -84,7 +84,8 @@ class _Compilation(event.Listener):
                 self._is_compiling = False
                 self._held.close()
 
-    def _announce_set_of(self, name: str) -> None:
+    def announce_set_of(self, name: str) -> None:
+        """Announce the set of kernels that a kernel belongs to, unless that was done."""
         place = temporary_folder()
         if place is not None and not _announced:
             self.announce(f"compiled kernels are kept in {place}; set NUMBA_CACHE_DIR to a folder that lasts")
@@ -106,19 +107,19 @@ def to_stderr(text: str) -> None:
     print(f"rubhpc: {text}", file=sys.stderr, flush=True)
 
 
-_compilation = _Compilation()
+compilation = _Compilation()
 for _kind in ("numba:compiler_lock", "numba:compile"):
-    event.register(_kind, _compilation)  # type: ignore[no-untyped-call]
+    event.register(_kind, compilation)  # type: ignore[no-untyped-call]
 
 
 def seconds_compiling() -> float:
     """Seconds that this process has spent on compilations so far."""
-    return _compilation.seconds
+    return compilation.seconds
 
 
 def is_compiling() -> bool:
     """Whether this process is compiling now."""
-    return _compilation.is_under_way
+    return compilation.is_under_way
 
 
 def expect_sets(names: set[str]) -> None:
@@ -129,8 +130,8 @@ def expect_sets(names: set[str]) -> None:
 @contextmanager
 def announced_by(announce: Callable[[str], None]) -> Iterator[None]:
     """Within this context, `announce` is called before a set of kernels that is in no cache is compiled."""
-    before, _compilation.announce = _compilation.announce, announce
+    before, compilation.announce = compilation.announce, announce
     try:
         yield
     finally:
-        _compilation.announce = before
+        compilation.announce = before

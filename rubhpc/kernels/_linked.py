@@ -9,6 +9,7 @@ numba with which it has not been tried; results are the same to rounding.
 
 from __future__ import annotations
 
+import ctypes
 import os
 from typing import Any
 
@@ -51,9 +52,10 @@ class _LinkedCode(JITCodeLibrary):
     def set_env(self, name: str, env: Any) -> None:
         """Do nothing: the environment in memory is that of the kernel."""
 
-    def get_pointer_to_function(self, name: str) -> int:
+    def get_pointer_to_function(self, name: str) -> int | None:
+        """Address of what Python calls: of a function that raises TypeError."""
         self._ensure_finalized()
-        return 0
+        return ctypes.cast(ctypes.pythonapi.PyErr_BadArgument, ctypes.c_void_p).value
 
     def _optimize_final_module(self) -> None:
         """Do nothing."""

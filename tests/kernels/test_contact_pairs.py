@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from calling import called
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import root
@@ -28,6 +29,10 @@ from rubhpc.kernels.contact_pairs import (
 )
 from rubhpc.kernels.laws import COULOMB as COULOMB_LAW
 from rubhpc.kernels.laws import MULTIPLIER
+
+fill_residual = called(fill_residual)
+force_on_disc = called(force_on_disc)
+is_any_closed = called(is_any_closed)
 
 solve_contact = plain(compiled_solve_contact)  # motions have it compiled; alone it takes 12 s to compile
 COULOMB = MULTIPLIER._replace(friction_law=COULOMB_LAW)

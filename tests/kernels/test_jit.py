@@ -136,6 +136,12 @@ def test_what_is_linked_into_a_kernel_is_its_own():
     assert "define internal" in code or "define linkonce_odr" not in code
 
 
+@pytest.mark.skipif(_linked.IS_PLAIN, reason="Python may call it")
+def test_what_only_kernels_call_is_refused_to_python():
+    with pytest.raises(TypeError):
+        add_rows(np.eye(2), np.ones(2), np.zeros(2))
+
+
 @_jit.jit
 def is_finite(x):
     return math.isfinite(x)

@@ -4,12 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from calling import called
 from test_retuned_modes import LAWS, setup
 
 from rubhpc.integrate.changing_speed.followed_modes import NODES, matched
 from rubhpc.integrate.changing_speed.mode_parts import speeds_of
 from rubhpc.integrate.changing_speed.near_modes import near_mode
 from rubhpc.kernels.contact_modes import enter, enter_rest
+
+enter = called(enter)
+enter_rest = called(enter_rest)
 
 REACH = 20.0  # rad/s
 

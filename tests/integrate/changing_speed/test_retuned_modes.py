@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from calling import called
 from trial_rig import trial_rig
 
 from rubhpc.case_arguments import case_of, read_probes
@@ -30,6 +31,10 @@ from rubhpc.kernels.contact_modes import enter
 from rubhpc.kernels.curved_levels import fill_level
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, lifted_place
 from rubhpc.kernels.measuring import energy_forms
+
+energy_forms = called(energy_forms)
+enter = called(enter)
+fill_level = called(fill_level)
 
 
 def setup(q):

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from calling import called
 from trial_rig import trial_rig
 
 from rubhpc import State
@@ -21,6 +22,13 @@ from rubhpc.kernels.product_forms import forms_gained
 from rubhpc.kernels.span_samples import read_rows
 from rubhpc.kernels.transitions import UNKNOWN, WORTH_A_TABLE, add_impulses, pass_over, see
 from rubhpc.study.study import Contact, Integrator, Recording
+
+add_impulses = called(add_impulses)
+energies_gained = called(energies_gained)
+forms_gained = called(forms_gained)
+pass_over = called(pass_over)
+read_rows = called(read_rows)
+still_rub = called(still_rub)
 
 PER_REVOLUTION = 64
 LAW = {
