@@ -20,7 +20,6 @@ from postproc.catalogue import figures
 from rubhpc import __version__
 from rubhpc.children import SAFE_PATH
 from rubhpc.errors import RubError, StoppedEarly, StoreError, printable
-from rubhpc.frames import with_room
 from rubhpc.running.launch import FIRST_SPEAKS, launch, leave
 from rubhpc.streams import lasting_streams
 from rubhpc.threads import VARIABLES
@@ -29,6 +28,7 @@ from rubhpc.threads import VARIABLES
 COMMANDS = {
     "run": ("rubhpc.commands.run:run", "Run or resume a study; the word run may be omitted."),
     "plan": ("rubhpc.commands.run:plan", "Cases, bytes, files, core-hours; done, failed and missing cases."),
+    "compile": ("rubhpc.commands.run:compile_kernels", "Compile the kernels of a study, before a large job."),
     "status": ("rubhpc.commands.run:status", "Progress and failures, also during a run."),
     "verify": ("rubhpc.commands.run:verify", "Check every stored case against its checksum."),
     "modes": (
@@ -132,7 +132,7 @@ def _end_quietly() -> None:
 def _code_of(args: list[str]) -> int:
     """Run the command line and report its error; returns the exit code."""
     try:
-        return with_room(commands.main, args, prog_name="rubhpc", standalone_mode=False) or 0
+        return commands.main(args, prog_name="rubhpc", standalone_mode=False) or 0
     except RubError as error:
         return _report(str(error), error.exit_code)
     except click.ClickException as error:

@@ -10,8 +10,6 @@ from functools import cache, wraps
 from threading import Lock
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
-from rubhpc.frames import with_room
-
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
@@ -32,15 +30,12 @@ VARIABLES = (
 
 
 def on_one_thread(function: Callable[P, T]) -> Callable[P, T]:
-    """Hold the libraries of linear algebra to one thread in a function, whatever the environment says.
-
-    The function has room for the frames of what it calls (`rubhpc.frames`).
-    """
+    """Hold the libraries of linear algebra to one thread in a function, whatever the environment says."""
 
     @wraps(function)
     def held(*args: P.args, **kwargs: P.kwargs) -> T:
         with one_thread():
-            return with_room(function, *args, **kwargs)
+            return function(*args, **kwargs)
 
     return held
 

@@ -1,4 +1,4 @@
-"""`rubhpc STUDY.toml`, `plan`, `status` and `verify`."""
+"""`rubhpc STUDY.toml`, `plan`, `compile`, `status` and `verify`."""
 
 from __future__ import annotations
 
@@ -134,6 +134,28 @@ def plan(study: Path, output: Path | None, trust_rig: bool, part: str | None) ->
         found = make_plan(read_study(study, output, trust_rig=trust_rig), part, say)
     start_up = time.process_time() - found.spent  # what this process and a run have in common
     click.echo(replace(found, start_up=_WHOLE_START * start_up).text())
+    return 0
+
+
+@click.command("compile")
+@click.argument("study", metavar="STUDY.toml", type=click.Path(path_type=Path))
+@_TRUST
+def compile_kernels(study: Path, trust_rig: bool) -> int:
+    """Compile the kernels of STUDY.toml and compute nothing.
+
+    A run does so by itself. Run this before a job of many processes, or where the kernels are installed for
+    others: they are kept beside the sources, or in NUMBA_CACHE_DIR.
+    """
+    from rubhpc.integrate.compilation import announced_by, seconds_compiling
+    from rubhpc.kernels._cache import cache_folder
+    from rubhpc.running.warm_up import warm_up
+    from rubhpc.study.cases import CaseGrid
+    from rubhpc.study.study import read_study
+
+    grid = CaseGrid(read_study(study, trust_rig=trust_rig))
+    with announced_by(click.echo):
+        warm_up(grid, grid.sequences()[0][0].start, lambda: None, all_sets=True)
+    click.echo(f"kernels in {cache_folder()}: {seconds_compiling():.0f} s of compilation")
     return 0
 
 

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.ahead import compile_ahead
 from rubhpc.integrate.closed_form_case import exponents_of, give_back, judge_of, trail_of
 from rubhpc.integrate.compilation import (
     COMMON,
@@ -49,6 +48,7 @@ from rubhpc.integrate.record import Record, State
 from rubhpc.integrate.repeated_record import repeat_period
 from rubhpc.integrate.scheme import Scheme
 from rubhpc.integrate.start import start_of
+from rubhpc.integrate.tangent_motion import TangentMotion
 from rubhpc.integrate.transient import pass_revolutions, pass_transient
 from rubhpc.kernels._jit import plain
 from rubhpc.kernels.laws import is_set_valued
@@ -116,7 +116,6 @@ def run_case(
     """
     n_whole = recording.longest_transient + recording.revolutions
     began = time.perf_counter() - seconds_compiling()
-    compile_ahead(setup)
     if isinstance(initial, State):
         state = fit_to_gaps(initial, setup, clearance)
     else:
@@ -182,16 +181,20 @@ def compile_kernels(
     friction: float,
     recording: Recording,
     check: Callable[[], None] | None = None,
+    all_sets: bool = False,
 ) -> None:
     """Compile the kernels that every case of this set-up calls, on two revolutions.
 
-    Kernels that only some cases call, for short steps and neighbouring motions, are compiled when a case
-    first calls them.
+    Those for short steps, which only some cases call, are compiled when a case first calls them; so are those
+    for neighbouring motions, unless `all_sets`.
     """
     short = replace(recording, transient=1, transient_limit=None, transient_tolerance=None, revolutions=1)
     record = run_case(setup, clearance=clearance, friction=friction, recording=short, check=check)
     if isinstance(setup, ModalSetup) and setup.scheme is Scheme.EVENT_DRIVEN and record.status == DONE:
         Solver(setup, clearance, friction, record.final)(1)
+        if all_sets:
+            start = partial(closed_form_march(setup), setup, clearance, friction, check=check)
+            TangentMotion(start, record.final, setup, recording).part(1)
 
 
 def _integrate(

@@ -1,16 +1,17 @@
-"""Announces the compilation of kernels and counts its time, which is not part of a case's computing time."""
+"""Compilation of kernels: announced, counted (it is no time of a case), and done by one process at a time."""
 
 from __future__ import annotations
 
-import gc
+import fcntl
 import sys
-from contextlib import contextmanager
+import threading
+import time
+from contextlib import ExitStack, contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
 from numba.core import event
 
-from rubhpc.kernels._cache import temporary_folder
-from rubhpc.kernels._jit import compilation
+from rubhpc.kernels._cache import cache_folder, drop_old, temporary_folder
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -21,9 +22,10 @@ STEPS, PERIODIC = "for contact in short steps", "for periodic motions"
 RUN_UPS = "for run-ups"
 NEIGHBOURS = "for neighbouring motions, which distinguish chaos from order"
 # Sets of kernels, each announced, and compiled when a case first needs it -> seconds that it takes, about.
-_SECONDS = {COMMON: 10, STICK: 70, CURVED: 70, STEPS: 10, PERIODIC: 10, RUN_UPS: 10, NEIGHBOURS: 10}
+_SECONDS = {COMMON: 10, STICK: 30, CURVED: 70, STEPS: 10, PERIODIC: 10, RUN_UPS: 10, NEIGHBOURS: 10}
 _SETS = {  # kernel -> its set; all others are common
     "advance_friction": STICK,
+    "change_states": STICK,
     "advance_by_steps": STEPS,
     "advance_curved": CURVED,
     "follow_revolutions": PERIODIC,
@@ -36,19 +38,68 @@ _announced: list[str] = []
 _expected: set[str] = set()  # sets of the study that is run
 
 
-def seconds_compiling() -> float:
-    """Seconds that this process has spent on compilations so far."""
-    return compilation.seconds
+class _Compilation(event.Listener):
+    """Listens to numba, which takes its lock, looks in the cache, and compiles what is not there.
 
+    Meanwhile this process has the lock of the cache. The others wait and load what it has compiled. Two at
+    once could write one file of the cache for different arguments.
+    """
 
-def is_compiling() -> bool:
-    """Whether this process is compiling now."""
-    return _uncollected.depth > 0
+    def __init__(self) -> None:
+        self.seconds = 0.0  # spent on compilation so far, waiting for other processes included
+        self.announce: Callable[[str], None] = to_stderr
+        self._depth, self._began, self._own = 0, 0.0, threading.Lock()
+        self._is_compiling = False
+        self._held = ExitStack()
 
+    @property
+    def is_under_way(self) -> bool:
+        """Whether this process compiles now."""
+        return self._is_compiling
 
-def expect_sets(names: set[str]) -> None:
-    """Take the sets of kernels that a run may need, for announcements that count them."""
-    _expected.update(names)
+    def on_start(self, event: Any) -> None:
+        if event.kind == "numba:compile":
+            dispatcher = event.data["dispatcher"]
+            if dispatcher.__module__.startswith("rubhpc.kernels."):
+                self._is_compiling = True
+                self.announce_set_of(dispatcher.__name__)
+            return
+        with self._own:
+            self._depth += 1
+            if self._depth == 1:
+                self._began, self._is_compiling = time.perf_counter(), False
+                with suppress(OSError):  # a folder that cannot be written, or a file system without locks
+                    lock = self._held.enter_context((cache_folder() / "lock").open("w"))
+                    fcntl.flock(lock, fcntl.LOCK_EX)
+
+    def on_end(self, event: Any) -> None:
+        if event.kind == "numba:compile":
+            return
+        with self._own:
+            self._depth -= 1
+            if self._depth == 0:
+                if self._is_compiling:
+                    self.seconds += time.perf_counter() - self._began
+                    drop_old()
+                self._is_compiling = False
+                self._held.close()
+
+    def announce_set_of(self, name: str) -> None:
+        """Announce the set of kernels that a kernel belongs to, unless that was done."""
+        place = temporary_folder()
+        if place is not None and not _announced:
+            self.announce(f"compiled kernels are kept in {place}; set NUMBA_CACHE_DIR to a folder that lasts")
+        kernels = _SETS.get(name, COMMON)
+        if kernels in _announced:
+            return
+        _announced.append(kernels)
+        n = len(_expected.intersection(_announced))
+        number = f"set {n} of at most {len(_expected)}, " if kernels in _expected else ""
+        purpose = f" {kernels}" if kernels else ""
+        self.announce(
+            f"compiling kernels{purpose}, once after an installation: "
+            f"{number}about {_SECONDS[kernels]} s on a free core"
+        )
 
 
 def to_stderr(text: str) -> None:
@@ -56,60 +107,31 @@ def to_stderr(text: str) -> None:
     print(f"rubhpc: {text}", file=sys.stderr, flush=True)
 
 
-def announce_by(announce: Callable[[str], None]) -> None:
-    """Call `announce` before kernels that are in no cache are compiled, once for each set of them."""
+compilation = _Compilation()
+for _kind in ("numba:compiler_lock", "numba:compile"):
+    event.register(_kind, compilation)  # type: ignore[no-untyped-call]
 
-    def begin(name: str) -> None:
-        place = temporary_folder()
-        if place is not None and not _announced:
-            announce(f"compiled kernels are kept in {place}; set NUMBA_CACHE_DIR to a folder that lasts")
-        kernels = _SETS.get(name, COMMON)
-        if kernels not in _announced:
-            _announced.append(kernels)
-            n = len(_expected.intersection(_announced))
-            number = f"set {n} of at most {len(_expected)}, " if kernels in _expected else ""
-            purpose = f" {kernels}" if kernels else ""
-            announce(
-                f"compiling kernels{purpose}, once after an installation: "
-                f"{number}about {_SECONDS[kernels]} s on a free core"
-            )
 
-    compilation.began = begin
+def seconds_compiling() -> float:
+    """Seconds that this process has spent on compilations so far."""
+    return compilation.seconds
+
+
+def is_compiling() -> bool:
+    """Whether this process is compiling now."""
+    return compilation.is_under_way
+
+
+def expect_sets(names: set[str]) -> None:
+    """Take the sets of kernels that a run may need, for announcements that count them."""
+    _expected.update(names)
 
 
 @contextmanager
 def announced_by(announce: Callable[[str], None]) -> Iterator[None]:
-    """`announce_by` within a context."""
-    before = compilation.began
-    announce_by(announce)
+    """Within this context, `announce` is called before a set of kernels that is in no cache is compiled."""
+    before, compilation.announce = compilation.announce, announce
     try:
         yield
     finally:
-        compilation.began = before
-
-
-class _Uncollected(event.Listener):
-    """Disables garbage collection while kernels are compiled (90 MB): it takes a twelfth of the time.
-
-    A later scan of these objects takes as long, so that they are excluded: the process is 80 MB larger.
-    """
-
-    def __init__(self) -> None:
-        self.depth, self._was_enabled = 0, False
-
-    def on_start(self, event: Any) -> None:
-        if self.depth == 0:
-            self._was_enabled = gc.isenabled()
-            gc.disable()
-        self.depth += 1
-
-    def on_end(self, event: Any) -> None:
-        self.depth -= 1
-        if self.depth == 0 and self._was_enabled:
-            gc.freeze()
-            gc.enable()
-
-
-_uncollected = _Uncollected()
-event.register("numba:compile", _uncollected)  # type: ignore[no-untyped-call]
-announce_by(to_stderr)
+        compilation.announce = before

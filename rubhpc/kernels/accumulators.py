@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline
+from rubhpc.kernels._jit import linked
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, TORSION, Pairs, V, W, Workspace, rim_sense
 from rubhpc.kernels.force_average import add_force
 
@@ -18,7 +17,7 @@ Ints = NDArray[np.int64]
 VERTICAL, HORIZONTAL, TWIST, TWIST_ACCELERATION = range(4)
 
 
-class Samples(NamedTuple):
+class Samples(Struct):
     """Shaft-locked samples; the force is the mean over the interval that begins with the sample."""
 
     rotor: Floats  # (4, n_sample), m, m, rad, rad/s2
@@ -29,7 +28,7 @@ class Samples(NamedTuple):
     whole: Floats  # (4 + 3 q + n_probe, n_sample), the arrays above as rows, in this order
 
 
-class Accumulator(NamedTuple):
+class Accumulator(Struct):
     """Running sums and extrema over the recorded revolutions."""
 
     highest: Floats  # (3,), of vertical, horizontal and torsional displacement
@@ -59,7 +58,7 @@ UNBALANCE_WORK, DRIVE_WORK, DAMPING_LOSS, FRICTION_LOSS, IMPACT_LOSS, RUB_WORK =
 STEP, IMPACT, PRESSING = range(3)
 
 
-@jit_inline
+@linked
 def observe_rub(drive: float, loss: float, accumulator: Accumulator) -> None:
     """Add the work of the drive against friction, the frictional loss, and the difference, J.
 
@@ -71,7 +70,7 @@ def observe_rub(drive: float, loss: float, accumulator: Accumulator) -> None:
     accumulator.energy[RUB_WORK] += drive - loss
 
 
-@jit_inline
+@linked
 def take_sample(
     displacement: Floats, output_row: Ints, pair_row: Ints, i_sample: int, samples: Samples
 ) -> None:
@@ -86,7 +85,7 @@ def take_sample(
             samples.lateral[i, i_sample] = displacement[pair_row[i, LATERAL]]
 
 
-@jit_inline
+@linked
 def observe_motion(
     displacement: Floats,
     output_row: Ints,
@@ -106,7 +105,7 @@ def observe_motion(
             peak_lateral[i] = max(peak_lateral[i], abs(displacement[row]))
 
 
-@jit_inline
+@linked
 def observe_contact(
     pairs: Pairs,
     work: Workspace,
@@ -161,7 +160,7 @@ def observe_contact(
         accumulator.energy[IMPACT_LOSS] -= force * opening * step
 
 
-@jit_inline
+@linked
 def observe_force(
     i: int, begin: float, step: float, impulse: float, first: float, last: float, accumulator: Accumulator
 ) -> None:
@@ -180,7 +179,7 @@ def observe_force(
     )
 
 
-@jit_inline
+@linked
 def observe_sense(i: int, sense: int, accumulator: Accumulator) -> None:
     """Record the sense (1 or -1) in which pair i slides, and count a reversal if it has changed."""
     if accumulator.sense[i] == -sense:
@@ -188,7 +187,7 @@ def observe_sense(i: int, sense: int, accumulator: Accumulator) -> None:
     accumulator.sense[i] = sense
 
 
-@jit_inline
+@linked
 def observe_solution(
     problem: int, pivots: int, residual: float, moved: float, accumulator: Accumulator
 ) -> None:
@@ -198,7 +197,7 @@ def observe_solution(
     accumulator.residual[problem, 1] = max(accumulator.residual[problem, 1], moved)
 
 
-@jit_inline
+@linked
 def centred(row: int, velocity: Floats, velocity_next: Floats) -> float:
     """Velocity of a degree at the time of the step's forces; zero where it is constrained."""
     return 0.5 * (velocity[row] + velocity_next[row]) if row >= 0 else 0.0

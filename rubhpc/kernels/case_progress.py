@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum
+from rubhpc.kernels._jit import jit_sum
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.contact_pairs import rim_sense
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ MOST_STEPS = 50_000  # of one call: the caller checks for stop signals between c
 NONE = -1  # no contact mode wanted, no energies to add, no halving
 
 
-class Clock(NamedTuple):
+class Clock(Struct):
     """Resolution and counting of time."""
 
     spin: float  # rad/s
@@ -33,7 +34,7 @@ class Clock(NamedTuple):
     growth: float  # 1/s, of the unbalance force from tick 0 on; 0 at a constant speed
 
 
-class Sections(NamedTuple):
+class Sections(Struct):
     """Ends of revolutions before tick 0, where the motion is kept."""
 
     motion: Floats  # (k, 2 n), the reduced motion at the end of each of the last k; filled in
@@ -113,14 +114,14 @@ def closed_pairs(progress: Progress, tables: ModeTables) -> int:
     return int(tables.mask[progress.mode])
 
 
-@jit_inline_sum
+@jit_sum
 def shaft_angle(clock: Clock, tick: int) -> float:
     """Angle of the shaft at a tick, rad, counted from the beginning of its revolution."""
     ticks_per_revolution = clock.samples_per_revolution << clock.sample_level
     return rim_sense(clock.spin) * 2.0 * np.pi * (tick % ticks_per_revolution) / ticks_per_revolution
 
 
-@jit_inline_sum
+@jit_sum
 def shaft_turn(clock: Clock, tick: int, after: float = 0.0) -> tuple[float, float]:
     """Cosine and sine of the shaft's angle a time `after` (s) a tick, times the growth of the unbalance."""
     angle = shaft_angle(clock, tick) + clock.spin * after

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit, jit_inline
+from rubhpc.kernels._jit import jit, linked
 from rubhpc.kernels.accumulators import (
     DAMPING_LOSS,
     IMPACT_LOSS,
@@ -43,7 +43,7 @@ FINISHED, DIVERGED, CONTACT_UNSOLVED = range(3)
 DECAYED = 1e-150  # m, m/s, rad or rad/s
 
 
-@jit_inline
+@linked
 def apply_contact(
     start: Ints,
     inverse: Floats,
@@ -252,7 +252,7 @@ def advance(
     return FINISHED
 
 
-@jit_inline
+@linked
 def observe_delays(row: Ints, work: Workspace, change: Floats, accumulator: Accumulator) -> None:
     """Correct the work of a step's impulses for the velocities at their instants, each after its delay.
 
@@ -270,7 +270,7 @@ def observe_delays(row: Ints, work: Workspace, change: Floats, accumulator: Accu
         accumulator.energy[IMPACT_LOSS] -= opened
 
 
-@jit_inline
+@linked
 def read_probes(
     probe: Floats,
     step: float,
@@ -292,7 +292,7 @@ def read_probes(
         seen[i, i_sample] = value
 
 
-@jit_inline
+@linked
 def flush_decayed(state: Floats) -> None:
     """Set decayed motion to zero: subnormal numbers make a step ten times slower."""
     for i in range(state.shape[0]):
@@ -301,7 +301,7 @@ def flush_decayed(state: Floats) -> None:
                 state[i, k] = 0.0
 
 
-@jit_inline
+@linked
 def has_diverged(displacement: Floats, output_row: Ints, pair_row: Ints, limit: float) -> bool:
     """Whether a displacement of the output node or of a rim is not finite or beyond the limit, m."""
     for k in range(2):

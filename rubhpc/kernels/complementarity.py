@@ -9,14 +9,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline, jit_lean
+from rubhpc.kernels._jit import linked
 
 Floats = NDArray[np.float64]
 
 UNSOLVED = -1
 
 
-@jit_lean
+@linked
 def solve_active(
     compliance: Floats, gap: Floats, active: NDArray[np.bool_], force: Floats, work: Floats
 ) -> bool:
@@ -46,7 +46,7 @@ def solve_active(
     return True
 
 
-@jit_lean
+@linked
 def solve_rows(work: Floats, n: int) -> bool:
     """Solve n linear equations in place, right-hand sides in the last column; False where singular."""
     q = work.shape[1] - 1
@@ -74,7 +74,7 @@ def solve_rows(work: Floats, n: int) -> bool:
     return True
 
 
-@jit_inline
+@linked
 def natural_residual(give: float, force: float, gap: float) -> float:
     """Distance of a pair from complementarity, in the unit of its gap: |min(give force, gap)|.
 
@@ -83,7 +83,7 @@ def natural_residual(give: float, force: float, gap: float) -> float:
     return float(abs(min(give * force, gap)))
 
 
-@jit_lean
+@linked
 def residual_of(compliance: Floats, gap: Floats, force: Floats) -> tuple[float, float]:
     """Largest residual of a problem at `force`, and the largest change of a gap by its own force."""
     largest, moved = 0.0, 0.0
@@ -96,7 +96,7 @@ def residual_of(compliance: Floats, gap: Floats, force: Floats) -> tuple[float, 
     return largest, moved
 
 
-@jit_lean
+@linked
 def solve_complementarity(
     compliance: Floats,
     gap: Floats,

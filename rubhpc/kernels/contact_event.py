@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_part_sum
+from rubhpc.kernels._jit import linked_sum
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.case_progress import CONTACT_UNSOLVED, DIVERGED, UNDER_WAY, Clock, Progress, shaft_turn
 from rubhpc.kernels.contact_modes import FORCED_LEVEL, ModeTables, Reduced
 from rubhpc.kernels.event_steps import enter_wanted, leave_mode, record_event, record_touch
@@ -25,7 +26,7 @@ Floats = NDArray[np.float64]
 MOST_EVENTS = 200_000  # in a revolution; more is chatter without end
 
 
-class EventWork(NamedTuple):
+class EventWork(Struct):
     """Work space of an event, q pairs."""
 
     force: Floats  # (q,)
@@ -50,7 +51,7 @@ def event_work(q: int) -> EventWork:
     )
 
 
-@jit_part_sum
+@linked_sum
 def begin_mode(
     tables: ModeTables,
     reduced: Reduced,
@@ -78,7 +79,7 @@ def begin_mode(
     return is_entered
 
 
-@jit_part_sum
+@linked_sum
 def take_event(
     tables: ModeTables,
     reduced: Reduced,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rubhpc.kernels._jit import jit_inline, jit_lean
+from rubhpc.kernels._jit import jit, linked
 from rubhpc.kernels.complementarity import UNSOLVED, natural_residual, solve_complementarity
 from rubhpc.kernels.contact_pairs import (
     N_DEGREE,
@@ -22,7 +22,7 @@ N_NEWTON = 25  # iterations for the curved gap; two or three are usual
 MOST_RESIDUAL = 1e-6  # over the displacement by the forces; rounding leaves 1e-9, more is no solution
 
 
-@jit_lean
+@jit
 def fill_compliances(pairs: Pairs, work: Workspace, step: float) -> None:
     """Fill the changes of gaps and slips by unit forces over a step; the directions are already filled."""
     if is_set_valued(pairs.law):
@@ -40,7 +40,7 @@ def fill_compliances(pairs: Pairs, work: Workspace, step: float) -> None:
         work.matrix[i, i] += softness(pairs.law, step)
 
 
-@jit_lean
+@linked
 def fill_targets(pairs: Pairs, work: Workspace, step: float) -> None:
     """Fill the gap required of each pair at the end of the step, and the delay of its impact."""
     for i in range(pairs.radius.size):
@@ -51,7 +51,7 @@ def fill_targets(pairs: Pairs, work: Workspace, step: float) -> None:
         work.target[i], work.delay[i] = gap_target(pairs.law, step, gap, opening, work.gap[i])
 
 
-@jit_inline
+@linked
 def fill_residual(pairs: Pairs, work: Workspace) -> None:
     """Fill the deviation of gaps and slips from the laws at the end, and their change by the forces."""
     distance, moved = 0.0, 0.0
@@ -69,7 +69,7 @@ def fill_residual(pairs: Pairs, work: Workspace) -> None:
     work.solution[1], work.solution[2] = distance, moved
 
 
-@jit_lean
+@linked
 def solve_contact(pairs: Pairs, work: Workspace, step: float, spin: float) -> int:
     """Contact forces of a step (s) at a spin (rad/s); returns the pairs in contact, or UNSOLVED.
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean, jit_lean_sum, short_loops
+from rubhpc.kernels._jit import jit_sum, linked, linked_sum
+from rubhpc.kernels._struct import Struct
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -27,7 +26,7 @@ LANES = 8  # coordinates are used in whole vectors
 DYING = -1.0  # pace of a mode that has decayed before the first step after an event ends
 
 
-class ModeTables(NamedTuple):
+class ModeTables(Struct):
     """Modal form of every set of closed contacts met so far; complex arrays as (real, imaginary) pairs.
 
     p contact modes, m coordinates (padded), q pairs, n reduced degrees, o output rows. The coordinates are
@@ -68,7 +67,7 @@ class ModeTables(NamedTuple):
     steady_power: Floats  # (p, 2), W, of damping and of the unbalance, not contained in the forms
 
 
-class Reduced(NamedTuple):
+class Reduced(Struct):
     """The linear bodies in a basis in which the mass matrix is the identity."""
 
     stiffness: Floats  # (n, n)
@@ -91,7 +90,7 @@ class Reduced(NamedTuple):
     overlap: float  # m, of an open pair that parts, up to which it continues without an event
 
 
-@jit_lean_sum
+@linked_sum
 def dot(re: Floats, im: Floats, z_re: Floats, z_im: Floats) -> float:
     """Real part of a row's product with the modal coordinates."""
     total = 0.0
@@ -100,7 +99,7 @@ def dot(re: Floats, im: Floats, z_re: Floats, z_im: Floats) -> float:
     return total
 
 
-@jit_inline_sum
+@linked_sum
 def bounded(weight: Floats, z_re: Floats, z_im: Floats) -> float:
     """Bound on a second derivative: weighted sum of the modes' magnitudes."""
     total = 0.0
@@ -109,7 +108,7 @@ def bounded(weight: Floats, z_re: Floats, z_im: Floats) -> float:
     return total
 
 
-@jit_inline_sum
+@linked_sum
 def propagate(re: Floats, im: Floats, z_re: Floats, z_im: Floats, next_re: Floats, next_im: Floats) -> None:
     """Modal coordinates after a tabulated step."""
     for k in range(z_re.size):
@@ -118,8 +117,7 @@ def propagate(re: Floats, im: Floats, z_re: Floats, z_im: Floats, next_re: Float
         next_im[k] = re[k] * b + im[k] * a
 
 
-@jit_lean
-@short_loops
+@linked
 def add_rows(rows: Floats, value: Floats, target: Floats) -> None:
     """Add the rows (n, m), times the values (n,), to the target (m,), four at a time, in order."""
     n_whole = value.size - value.size % 4
@@ -139,8 +137,7 @@ def add_rows(rows: Floats, value: Floats, target: Floats) -> None:
             target[k] += last[k] * a
 
 
-@jit_lean_sum
-@short_loops
+@jit_sum
 def enter_with(
     n_eigenmode: int,
     used: int,
@@ -177,7 +174,7 @@ def enter_with(
         z[0, n_eigenmode + 1 + i], z[1, n_eigenmode + 1 + i] = clearance[i], 0.0
 
 
-@jit_inline_sum
+@linked_sum
 def enter(
     tables: ModeTables, mode: int, clearance: Floats, cosine: float, sine: float, motion: Floats, z: Floats
 ) -> None:
@@ -198,8 +195,7 @@ def enter(
     )
 
 
-@jit_inline_sum
-@short_loops
+@linked_sum
 def leave(tables: ModeTables, mode: int, z: Floats, motion: Floats) -> None:
     """Reduced motion (2 n,) of the coordinates `z` (2, m) in a contact mode."""
     used = used_width(tables, mode)
@@ -220,7 +216,7 @@ def leave(tables: ModeTables, mode: int, z: Floats, motion: Floats) -> None:
         motion[row] = dot(re[row], im[row], z_re, z_im)
 
 
-@jit_lean_sum
+@linked_sum
 def enter_rest(
     motion_re: Floats,
     motion_im: Floats,
@@ -241,7 +237,7 @@ def enter_rest(
     add_rows(enter_im, motion, z[1])
 
 
-@jit_inline_sum
+@linked_sum
 def used_width(tables: ModeTables, mode: int) -> int:
     """How many coordinates of a contact mode are used, in whole vectors; those behind them are zero.
 
@@ -251,7 +247,7 @@ def used_width(tables: ModeTables, mode: int) -> int:
     return int(min((used + LANES - 1) // LANES * LANES, tables.switch_re.shape[2]))
 
 
-@jit_inline_sum
+@linked_sum
 def copy_coordinates(z: Floats, target: Floats) -> None:
     """Copy coordinates (2, m)."""
     for part in range(2):
@@ -259,7 +255,7 @@ def copy_coordinates(z: Floats, target: Floats) -> None:
             target[part, k] = z[part, k]
 
 
-@jit_lean_sum
+@linked_sum
 def find_mode(mask: Ints, wanted: int) -> int:
     """Index of the mode with the wanted set of closed pairs; -1 where it is not tabulated yet."""
     for mode in range(mask.size):
@@ -268,7 +264,7 @@ def find_mode(mask: Ints, wanted: int) -> int:
     return -1
 
 
-@jit_inline_sum
+@linked_sum
 def positive_interval(s: float, rate: float, bound: float) -> float:
     """Time, s, in which a switch function stays positive: `s + s' t - b t^2 / 2 > 0`."""
     if not s > 0.0:
@@ -278,7 +274,7 @@ def positive_interval(s: float, rate: float, bound: float) -> float:
     return -s / rate if rate < 0.0 else np.inf
 
 
-@jit_inline_sum
+@linked_sum
 def event_free_interval(
     switch_re: Floats,
     switch_im: Floats,
@@ -298,7 +294,7 @@ def event_free_interval(
     return proved
 
 
-@jit_inline_sum
+@linked_sum
 def resolved_time(re: Floats, im: Floats, pace: Floats, least: float, z_re: Floats, z_im: Floats) -> float:
     """Time, s, over which Hermite's cubic follows a signal with these rows (m,) to 1e-4 of its size.
 
@@ -314,7 +310,7 @@ def resolved_time(re: Floats, im: Floats, pace: Floats, least: float, z_re: Floa
     return float((RESOLVED * size / bend) ** 0.25) if bend > 0.0 else np.inf
 
 
-@jit_lean_sum
+@jit_sum
 def is_within(
     motion: Floats,
     translations: Floats,
@@ -349,7 +345,7 @@ def is_within(
     return bool(0.5 * twice <= energy_limit)
 
 
-@jit_inline_sum
+@linked_sum
 def is_beyond(reduced: Reduced, displacement: Floats) -> bool:
     """Whether reduced displacements, the first n of a motion, pass the limit or are NaN."""
     for row in range(reduced.translations.shape[0]):

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit, jit_inline
+from rubhpc.kernels._jit import jit, linked
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.laws import Law  # noqa: TC001 - part of a kernel's signature
 
 Floats = NDArray[np.float64]
@@ -18,7 +17,7 @@ V, W, TORSION, AXIAL, LATERAL = range(5)
 N_DEGREE = 5
 
 
-class Pairs(NamedTuple):
+class Pairs(Struct):
     """The q contact pairs of a case."""
 
     row: Ints  # (q, 5), row of each degree in the state; -1 where it is constrained or absent
@@ -34,7 +33,7 @@ class Pairs(NamedTuple):
     law: Law
 
 
-class Workspace(NamedTuple):
+class Workspace(Struct):
     """Arrays of one contact solution."""
 
     at: Floats  # (q, 5), displacement of each degree at the end of the step without forces, m or rad
@@ -67,13 +66,13 @@ class Workspace(NamedTuple):
     solution: Floats  # (3,), of the last one: pivots, deviation from the laws, displacement by forces, m
 
 
-@jit_inline
+@linked
 def rim_sense(spin: float) -> float:
     """1 or -1: direction in which the rim slides over a tip, the sign of friction and slip."""
     return 1.0 if spin >= 0.0 else -1.0
 
 
-@jit_inline
+@linked
 def force_on_disc(
     ny: float, nz: float, force: float, friction: float, radius: float
 ) -> tuple[float, float, float]:
@@ -86,7 +85,7 @@ def force_on_disc(
     return -force * ny + slide * nz, -force * nz - slide * ny, -slide * radius
 
 
-@jit_inline
+@jit
 def normal_and_gap(
     ey: float, ez: float, radius: float, clearance: float, aside: float, is_updated: bool, at: Floats
 ) -> tuple[float, float, float]:
@@ -103,7 +102,7 @@ def normal_and_gap(
     return y / distance, z / distance, distance - radius
 
 
-@jit_inline
+@jit
 def fill_directions(
     pairs: Pairs, i: int, ny: float, nz: float, force_direction: Floats, gap_jacobian: Floats
 ) -> None:
@@ -127,7 +126,7 @@ def fill_friction_direction(pairs: Pairs, i: int, ny: float, nz: float, friction
     friction_direction[AXIAL], friction_direction[LATERAL] = -nz * ey + ny * ez, nz * ez + ny * ey
 
 
-@jit
+@linked
 def fill_matrix(pairs: Pairs, rows: Floats, columns: Floats, matrix: Floats) -> None:
     """Displacement along `rows` (q, 5) by unit forces along `columns`, `rows Mt^-1 columns^T`, m/N."""
     q = pairs.radius.size
@@ -140,7 +139,7 @@ def fill_matrix(pairs: Pairs, rows: Floats, columns: Floats, matrix: Floats) -> 
             matrix[i, j] = total
 
 
-@jit_inline
+@linked
 def fill_moved(pairs: Pairs, work: Workspace, i: int) -> None:
     """Degrees of pair i with the contact forces applied, into `work.moved`."""
     for a in range(N_DEGREE):
@@ -152,7 +151,7 @@ def fill_moved(pairs: Pairs, work: Workspace, i: int) -> None:
         work.moved[a] = total
 
 
-@jit_inline
+@linked
 def fill_start(row: Ints, displacement: Floats, velocity: Floats, now: Floats, rate: Floats) -> None:
     """Degrees `now` and their `rate` (q, 5) at the beginning of a step, from those of the system (n_dof,)."""
     for i in range(row.shape[0]):
@@ -162,7 +161,7 @@ def fill_start(row: Ints, displacement: Floats, velocity: Floats, now: Floats, r
             rate[i, a] = velocity[k] if k >= 0 else 0.0
 
 
-@jit_inline
+@linked
 def is_any_closed(
     row: Ints,
     axis_y: Floats,
@@ -191,7 +190,7 @@ def is_any_closed(
     return is_closed
 
 
-@jit_inline
+@jit
 def pair_normal_and_gap(pairs: Pairs, i: int, at: Floats) -> tuple[float, float, float]:
     """`normal_and_gap` of pair i."""
     return normal_and_gap(

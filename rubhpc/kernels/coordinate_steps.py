@@ -5,27 +5,26 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_apart_sum, jit_inline_sum, short_loops
+from rubhpc.kernels._jit import linked_sum
 
 Floats = NDArray[np.float64]
 
 MANTISSA, BIAS = 52, 1023  # bits, and offset of the exponent of a double
 
 
-@jit_inline_sum
+@linked_sum
 def lowest_level(count: int) -> int:
     """Level of the shortest of the powers of two that make up a count of at least one."""
     return floor_log2(count & -count)
 
 
-@jit_inline_sum
+@linked_sum
 def floor_log2(count: int) -> int:
     """Largest level with 2^level <= count, from 1 to 2^53: the exponent of the count as a float."""
     return int((np.float64(count).view(np.int64) >> MANTISSA) - BIAS)
 
 
-@jit_apart_sum
-@short_loops
+@linked_sum
 def go_on(
     count: int, power_re: Floats, power_im: Floats, z_re: Floats, z_im: Floats, re: Floats, im: Floats
 ) -> None:
@@ -54,8 +53,7 @@ def go_on(
         turn_on(rest << (level + 1), power_re, power_im, re, im)
 
 
-@jit_apart_sum
-@short_loops
+@linked_sum
 def turn_on(count: int, power_re: Floats, power_im: Floats, z_re: Floats, z_im: Floats) -> None:
     """Advance modal coordinates (m,) by `count` ticks in place, as `go_on`."""
     level, rest = 0, count

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline, jit_lean
+from rubhpc.kernels._jit import linked
 from rubhpc.kernels.complementarity import UNSOLVED
 from rubhpc.kernels.contact_pairs import N_DEGREE, Pairs, Workspace
 from rubhpc.kernels.laws import friction_coefficient
@@ -28,7 +28,7 @@ UNNOTICED = 1e-6  # of the slip that friction can change in a step: less counts 
 LAST_BITS = 2e-15  # of the positions of a pair: their difference, the slip of a step, errs by as much
 
 
-@jit_lean
+@linked
 def fill_slip(pairs: Pairs, work: Workspace, step: float, spin: float) -> None:
     """Slip of every pair over the step without forces, m, into `work.slip`."""
     for i in range(pairs.radius.size):
@@ -38,7 +38,7 @@ def fill_slip(pairs: Pairs, work: Workspace, step: float, spin: float) -> None:
         work.slip[i] = total
 
 
-@jit_lean
+@linked
 def solve_friction(pairs: Pairs, work: Workspace, step: float, spin: float) -> int:
     """Forces N and T of all pairs, into `work.force` and `work.traction`; pivots taken, or UNSOLVED.
 
@@ -77,7 +77,7 @@ def solve_friction(pairs: Pairs, work: Workspace, step: float, spin: float) -> i
     return pivots
 
 
-@jit_inline
+@linked
 def slip_speed_before(pairs: Pairs, work: Workspace, i: int, spin: float) -> float:
     """Slip of the rim of pair i over the tip before the forces of the step, m/s."""
     speed: float = pairs.radius[i] * spin
@@ -86,7 +86,7 @@ def slip_speed_before(pairs: Pairs, work: Workspace, i: int, spin: float) -> flo
     return speed
 
 
-@jit_lean
+@linked
 def feeds_energy(pairs: Pairs, work: Workspace, i: int, step: float, spin: float) -> bool:
     """Whether the friction of pair i has the direction of the mean slip, so that it adds energy."""
     before = step * pairs.radius[i] * spin
@@ -103,7 +103,7 @@ def feeds_energy(pairs: Pairs, work: Workspace, i: int, step: float, spin: float
     return bool(work.traction[i] * (before + after) < -abs(work.traction[i]) * least)
 
 
-@jit_inline
+@linked
 def friction_residual(work: Workspace, i: int) -> tuple[float, float]:
     """Deviation of pair i from Coulomb's law, and the change of its slip by its friction, m."""
     slip = work.slip[i]
@@ -115,7 +115,7 @@ def friction_residual(work: Workspace, i: int) -> tuple[float, float]:
     return give * abs(work.traction[i] - wanted), give * abs(work.traction[i])
 
 
-@jit_lean
+@linked
 def solve_cones(work: Workspace) -> int:
     """Forces for the given `work.cone`; pivots taken, or UNSOLVED.
 
@@ -151,7 +151,7 @@ def solve_cones(work: Workspace) -> int:
     return UNSOLVED
 
 
-@jit_lean
+@linked
 def solve_members(work: Workspace, q: int) -> int:
     """Forces of the first q `work.members`; pivots taken, or UNSOLVED.
 

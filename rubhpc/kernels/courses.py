@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit
+from rubhpc.kernels._jit import jit, linked
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.contact_modes import STILL
 
 if TYPE_CHECKING:
@@ -18,14 +19,14 @@ Complexes = NDArray[np.complex128]
 Ints = NDArray[np.int64]
 
 
-class Course(NamedTuple):
+class Course(Struct):
     """Entries of an array that go with the speed, k of them."""
 
     at: Ints  # (k,), in the array, flat
     value: Floats  # (p, k), factors of the powers 0, 1, ... of the place in the range, from -1 to 1
 
 
-class Courses(NamedTuple):
+class Courses(Struct):
     """What of a mode goes with the speed; none of it where nothing does."""
 
     kept: Floats  # (s,), the memory of what `filling.ModeCourse` has of it
@@ -67,7 +68,7 @@ def take_course(course: Course, place: float, values: Floats) -> None:
         values[at[j]] = total
 
 
-@jit
+@linked
 def follow(tables: ModeTables, mode: int, courses: Courses, place: float) -> None:
     """Bring a mode and its tables to a place in the range, but for what follows from these."""
     take_course(courses.kept_shape, place, courses.kept)
@@ -86,7 +87,7 @@ def follow(tables: ModeTables, mode: int, courses: Courses, place: float) -> Non
     take_course(courses.loss, place, tables.loss[mode].reshape(-1))
 
 
-@jit
+@linked
 def follow_rates(tables: ModeTables, mode: int, exponent: Complexes, n_eigenmode: int) -> None:
     """Rates of what eigenmodes make of switch functions and slip, as their exponents are."""
     inverse = np.zeros(n_eigenmode if tables.primitive_re.shape[1] > 0 else 0, dtype=np.complex128)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from rubhpc.kernels._jit import jit_inline_sum
+from rubhpc.kernels._jit import linked_sum
 
 
-@jit_inline_sum
+@linked_sum
 def turning_value(before: float, rate_before: float, after: float, rate_after: float, step: float) -> float:
     """Extremum of Hermite's cubic through values and rates of opposite sign at a step's ends (step in s)."""
     a, b = rate_before * step, rate_after * step

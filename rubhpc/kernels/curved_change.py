@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_lean_sum
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.accumulators import IMPACT, PRESSING, Accumulator, observe_solution
 from rubhpc.kernels.complementarity import UNSOLVED, residual_of, solve_active, solve_complementarity
 from rubhpc.kernels.contact_modes import Reduced
@@ -16,7 +16,7 @@ from rubhpc.kernels.mode_change import AT_REST, OPENING, hidden_flight, least_fl
 Floats = NDArray[np.float64]
 
 
-@jit_lean_sum
+@linked_sum
 def look_at(pairs: CurvedPairs, i: int, motion: Floats, work: CurvedWork) -> float:
     """Fill geometry, Jacobian and force direction of pair i from a reduced motion (2 n,).
 
@@ -36,7 +36,7 @@ def look_at(pairs: CurvedPairs, i: int, motion: Floats, work: CurvedWork) -> flo
     return bends
 
 
-@jit_lean_sum
+@linked_sum
 def change_curved(
     pairs: CurvedPairs,
     reduced: Reduced,

@@ -10,12 +10,11 @@ Lobatto's five points, of order 8.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum
+from rubhpc.kernels._jit import linked_sum
+from rubhpc.kernels._struct import Struct
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -44,7 +43,7 @@ PARTS = np.ascontiguousarray(
 BEFORE, LARGEST, RESOLVED, PATIENCE, PAST, SWEEPS, SOLVED, SLOPED, KEPT = range(9)
 
 
-class CurvedPairs(NamedTuple):
+class CurvedPairs(Struct):
     """Pairs with a curved gap: q pairs, n reduced degrees, b bending displacements of each."""
 
     row: Floats  # (q, 3 + b, n), motions of each pair; rad/m^0.5 of a bending displacement, twist in rad
@@ -61,7 +60,7 @@ class CurvedPairs(NamedTuple):
     sense: float  # 1 or -1, of the spin
 
 
-class CurvedTables(NamedTuple):
+class CurvedTables(Struct):
     """Further tables of p contact modes for curved gaps; m coordinates, d = 2 + b motions and twist."""
 
     used: Ints  # (p,), number of coordinates that are not padding
@@ -97,7 +96,7 @@ class CurvedTables(NamedTuple):
     drain_moved: Floats  # (p, r + 2, q), subtracted for a unit rate of h
 
 
-class CurvedWork(NamedTuple):
+class CurvedWork(Struct):
     """Work space, and the state of closed contacts between steps."""
 
     h: Floats  # (5, q), m, at the nodes of the step
@@ -222,7 +221,7 @@ def curved_work(q: int, n_row: int, n: int, m: int, n_loss: int, n_level: int) -
     )
 
 
-@jit_inline_sum
+@linked_sum
 def is_closed(mask: int, i: int) -> bool:
     """Whether pair i is closed."""
     return (mask >> i) & 1 == 1

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.case_progress import NONE, Clock, Progress, shaft_turn
 from rubhpc.kernels.contact_modes import DYING, FORCED_LEVEL, ModeTables, Reduced, enter, enter_rest
 from rubhpc.kernels.curved_contact import (
@@ -28,7 +28,7 @@ from rubhpc.kernels.mode_change import GAP_TOLERANCE, product
 Floats = NDArray[np.float64]
 
 
-@jit_lean_sum
+@linked_sum
 def enter_curved(
     tables: ModeTables,
     curved: CurvedTables,
@@ -69,7 +69,7 @@ def enter_curved(
     return True
 
 
-@jit_inline_sum
+@linked_sum
 def enter_keeping(
     tables: ModeTables,
     reduced: Reduced,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.complementarity import solve_active
 from rubhpc.kernels.contact_modes import dot
 from rubhpc.kernels.curved_contact import (
@@ -29,7 +29,7 @@ EXACT = 1e-17  # m, change of h at which they end
 CLOSE = 1e-11  # m, the same for a method that squares the error
 
 
-@jit_inline_sum
+@linked_sum
 def curvature(radius: float, across: float, is_round: bool) -> float:
     """Height of a round rim above its chord at a closed pair, m: r - sqrt(r^2 - d^2) without cancellation."""
     if not is_round:
@@ -38,7 +38,7 @@ def curvature(radius: float, across: float, is_round: bool) -> float:
     return float(square / (radius + np.sqrt(radius * radius - square)))
 
 
-@jit_lean_sum
+@linked_sum
 def read_motion(
     tables: CurvedTables, mode: int, mask: int, which: int, z_re: Floats, z_im: Floats, motion: Floats
 ) -> None:
@@ -61,7 +61,7 @@ def read_motion(
                 motion[2, i, j] = dot(tables.read_re[mode, i, a], tables.read_im[mode, i, a], z_re, z_im)
 
 
-@jit_lean_sum
+@linked_sum
 def find_heights(
     pairs: CurvedPairs, tables: CurvedTables, mode: int, mask: int, node: int, work: CurvedWork
 ) -> None:
@@ -119,7 +119,7 @@ def find_heights(
                     )
 
 
-@jit_inline_sum
+@linked_sum
 def take_off(
     tables: CurvedTables, mode: int, mask: int, which: int, derivative: int, h: Floats, motion: Floats
 ) -> None:
@@ -132,7 +132,7 @@ def take_off(
                     motion[derivative, i, j] -= tables.moved[mode, i, j, k] * h[k]
 
 
-@jit_lean_sum
+@linked_sum
 def fill_geometry(pairs: CurvedPairs, i: int, d: int, work: CurvedWork) -> tuple[float, float]:
     """Normal, gap Jacobian and force direction of pair i at `work.motion`; gap (m) and its curvature (m/s2).
 
@@ -166,7 +166,7 @@ def fill_geometry(pairs: CurvedPairs, i: int, d: int, work: CurvedWork) -> tuple
     return distance - pairs.radius[i], bends
 
 
-@jit_lean_sum
+@linked_sum
 def slip_of(pairs: CurvedPairs, i: int, d: int, rim_speed: float, work: CurvedWork) -> float:
     """Slip speed, m/s, of pair i with its geometry filled; positive in steady sliding."""
     motion = work.motion
@@ -177,7 +177,7 @@ def slip_of(pairs: CurvedPairs, i: int, d: int, rim_speed: float, work: CurvedWo
     return float(rim_speed + pairs.sense * (pairs.radius[i] * motion[1, i, d] - slide))
 
 
-@jit_lean_sum
+@linked_sum
 def evaluate(
     pairs: CurvedPairs,
     tables: CurvedTables,
@@ -225,7 +225,7 @@ def evaluate(
     return is_finite
 
 
-@jit_lean_sum
+@linked_sum
 def find_gaps(
     pairs: CurvedPairs,
     tables: CurvedTables,
@@ -250,7 +250,7 @@ def find_gaps(
             work.gap[1, node, i] = opens
 
 
-@jit_lean_sum
+@linked_sum
 def fill_loads(pairs: CurvedPairs, i: int, d: int, node: int, work: CurvedWork) -> None:
     """Fill the loads of pair i at a node from its geometry and force."""
     force, load, direction = work.force[node, i], work.load[node, i], work.direction[i]
@@ -261,7 +261,7 @@ def fill_loads(pairs: CurvedPairs, i: int, d: int, node: int, work: CurvedWork) 
         load[j + 2] = force * direction[j]
 
 
-@jit_inline_sum
+@linked_sum
 def find_lone_forces(
     pairs: CurvedPairs, tables: CurvedTables, rim_speed: Floats, mode: int, node: int, work: CurvedWork
 ) -> bool:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.contact_modes import add_rows, dot
 from rubhpc.kernels.curved_contact import (
     HEIGHT,
@@ -37,7 +37,7 @@ from rubhpc.kernels.curved_newton import (
 Floats = NDArray[np.float64]
 
 
-@jit_lean_sum
+@linked_sum
 def find_joint_system(tables: CurvedTables, mode: int, level: int, mask: int, work: CurvedWork) -> bool:
     """Fill `work.systems` with the factors of I - Q P of a step of 2^level ticks; False if it is singular."""
     q, middle, system, n = work.h.shape[1], work.middle, work.systems[level], 0
@@ -72,7 +72,7 @@ def find_joint_system(tables: CurvedTables, mode: int, level: int, mask: int, wo
     return factorise(system, work.orders[level, :size])
 
 
-@jit_inline_sum
+@linked_sum
 def move_jointly(tables: CurvedTables, mode: int, level: int, mask: int, work: CurvedWork) -> None:
     """Correct the loads by their residual and by its effect through the states."""
     q, n_load, point, state = work.h.shape[1], work.load.shape[2], work.point, work.unknown
@@ -119,7 +119,7 @@ def move_jointly(tables: CurvedTables, mode: int, level: int, mask: int, work: C
         point[LOADS, j] += point[MOVE, j]
 
 
-@jit_inline_sum
+@linked_sum
 def take_joint_states(mask: int, work: CurvedWork) -> None:
     """Copy h, its rate and the forces of the closed pairs at the nodes from the last correction."""
     q, p, c = work.h.shape[1], 0, 0

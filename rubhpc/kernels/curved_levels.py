@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline, jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import linked, linked_sum
 from rubhpc.kernels.curved_contact import LAGRANGE, N_NODE, NODES, CurvedTables
 from rubhpc.kernels.retuning_exponentials import exponential
 
@@ -22,7 +22,7 @@ _WEIGHTS = np.ascontiguousarray(
 )
 
 
-@jit_inline
+@linked
 def phi_functions(x: complex) -> tuple[complex, complex, complex, complex, complex, complex]:
     """phi_0 to phi_5: `phi_k = (phi_(k-1) - 1 / (k - 1)!) / x`, phi_0 the exponential.
 
@@ -47,7 +47,7 @@ def phi_functions(x: complex) -> tuple[complex, complex, complex, complex, compl
     return whole, first, second, third, fourth, (fourth - 1.0 / 24.0) * inverse
 
 
-@jit_lean_sum
+@linked_sum
 def fill_level(tables: CurvedTables, mode: int, level: int, step: float) -> None:
     """Fill the tables of a mode for steps of 2^level ticks (s).
 
@@ -72,7 +72,7 @@ def fill_level(tables: CurvedTables, mode: int, level: int, step: float) -> None
     tables.is_filled[mode, level] = True
 
 
-@jit_inline_sum
+@linked_sum
 def _combine(factor: Floats, time: float, values: Floats) -> None:
     """Replace values (5, m) by their combinations `time factor values`."""
     for k in range(values.shape[1]):
@@ -82,7 +82,7 @@ def _combine(factor: Floats, time: float, values: Floats) -> None:
             values[i, k] = time * (row[0] * a + row[1] * b + row[2] * c + row[3] * d + row[4] * e)
 
 
-@jit_lean_sum
+@linked_sum
 def _fill_lone(tables: CurvedTables, mode: int, level: int) -> None:
     """Fill what the readings of a single pair at the nodes have of the coordinates and of the loads."""
     n_read, n_load = tables.read_re.shape[2], tables.load_re.shape[2]

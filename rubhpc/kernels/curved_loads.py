@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.curved_contact import (
     HEIGHT,
     HEIGHT_RATE,
@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 LOADS, IMAGE, GUESS, MISSED, MOVE, FORCES = range(6)
 
 
-@jit_inline_sum
+@linked_sum
 def take_loads(mask: int, work: CurvedWork, target: Floats) -> int:
     """Fill `target` with the loads of the closed pairs at the nodes after the first; returns their number."""
     n = 0
@@ -38,7 +38,7 @@ def take_loads(mask: int, work: CurvedWork, target: Floats) -> int:
     return n
 
 
-@jit_inline_sum
+@linked_sum
 def give_loads(mask: int, work: CurvedWork) -> None:
     """Set the loads of the closed pairs to `LOADS`."""
     n = 0
@@ -50,7 +50,7 @@ def give_loads(mask: int, work: CurvedWork) -> None:
                     n += 1
 
 
-@jit_inline_sum
+@linked_sum
 def weigh_loads(pairs: CurvedPairs, mask: int, step: float, work: CurvedWork) -> None:
     """Fill `FORCES` for a step (s)."""
     forces, n_load, n = work.point[FORCES], work.load.shape[2], 0
@@ -64,7 +64,7 @@ def weigh_loads(pairs: CurvedPairs, mask: int, step: float, work: CurvedWork) ->
                 n += n_load
 
 
-@jit_lean_sum
+@linked_sum
 def size_of(change: Floats, n: int, n_load: int, forces: Floats) -> float:
     """Largest change of n loads at a node as a force, N, without the rates of h."""
     largest = 0.0

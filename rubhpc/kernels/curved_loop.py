@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_lean_sum
+from rubhpc.kernels._jit import jit_sum
 from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
     FINISHED,
@@ -71,7 +71,7 @@ GROWTH = 2  # steps are at most 2^this times the age of the contact
 OBSERVED = 3e-3  # of the tolerance of loads, while recording, so that energies balance
 
 
-@jit_lean_sum
+@jit_sum
 def advance_curved(
     tables: ModeTables,
     curved: CurvedTables,

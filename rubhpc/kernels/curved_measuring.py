@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.accumulators import (
     DAMPING_LOSS,
     UNBALANCE_WORK,
@@ -43,7 +43,7 @@ Floats = NDArray[np.float64]
 RESOLVED_FIFTH = 4.1
 
 
-@jit_lean_sum
+@linked_sum
 def place(
     tables: ModeTables,
     curved: CurvedTables,
@@ -65,7 +65,7 @@ def place(
                 motion[n + k] -= curved.shift[mode, i, k] * rate[i]
 
 
-@jit_lean_sum
+@linked_sum
 def begin_curved_span(
     pairs: CurvedPairs,
     tables: ModeTables,
@@ -91,7 +91,7 @@ def begin_curved_span(
     progress.energy_from = progress.tick
 
 
-@jit_lean_sum
+@linked_sum
 def resolved_transient(tables: ModeTables, mode: int, work: CurvedWork) -> float:
     """Time, s, over which polynomials follow the transient of force and slip of the closed pairs.
 
@@ -117,7 +117,7 @@ def resolved_transient(tables: ModeTables, mode: int, work: CurvedWork) -> float
     return time
 
 
-@jit_lean_sum
+@linked_sum
 def resolved_part(re: Floats, im: Floats, least: float, pace: Floats, work: CurvedWork) -> float:
     """The same for one signal, with a size of at least `least`."""
     size, bend, transient = 0.0, 0.0, work.transient
@@ -131,7 +131,7 @@ def resolved_part(re: Floats, im: Floats, least: float, pace: Floats, work: Curv
     return float((RESOLVED_FIFTH * max(size, least) / bend) ** 0.2) if bend > 0.0 else np.inf
 
 
-@jit_inline_sum
+@linked_sum
 def observe_power(
     pairs: CurvedPairs,
     tables: ModeTables,
@@ -164,7 +164,7 @@ def observe_power(
     work.power[node, 0], work.power[node, 1] = loss, gain
 
 
-@jit_inline_sum
+@linked_sum
 def observe_energies(
     pairs: CurvedPairs,
     tables: ModeTables,
@@ -200,7 +200,7 @@ def observe_energies(
         transient[0, k], transient[1, k] = p_re[k] * re - p_im[k] * im, p_re[k] * im + p_im[k] * re
 
 
-@jit_inline_sum
+@linked_sum
 def observe_curved_step(
     reduced: Reduced,
     mask: int,
@@ -239,7 +239,7 @@ def observe_curved_step(
         observe_rub(reduced.friction[i] * reduced.rim_speed[i] * impulse, friction_work, accumulator)
 
 
-@jit_inline_sum
+@linked_sum
 def take_curved_sample(
     tables: ModeTables,
     curved: CurvedTables,

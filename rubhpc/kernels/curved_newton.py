@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.contact_modes import add_rows
 from rubhpc.kernels.curved_contact import (
     ACROSS,
@@ -37,7 +37,7 @@ N_STATE = 3  # states per node, through which loads act: h, its rate and the for
 STATE_H, STATE_RATE, STATE_FORCE = range(N_STATE)
 
 
-@jit_inline_sum
+@linked_sum
 def fill_slopes(pairs: CurvedPairs, tables: CurvedTables, mode: int, node: int, work: CurvedWork) -> None:
     """Derivatives of h, its rate and the force of the single pair at a node by its readings.
 
@@ -140,7 +140,7 @@ def fill_slopes(pairs: CurvedPairs, tables: CurvedTables, mode: int, node: int, 
         lever[j] = direction[j]
 
 
-@jit_inline_sum
+@linked_sum
 def find_system(tables: CurvedTables, mode: int, level: int, work: CurvedWork) -> bool:
     """Fill `work.answer` with Q of a step of 2^level ticks, and `work.system` with the factors of I - Q P.
 
@@ -167,7 +167,7 @@ def find_system(tables: CurvedTables, mode: int, level: int, work: CurvedWork) -
     return factorise(system, work.order)
 
 
-@jit_lean_sum
+@linked_sum
 def factorise(system: Floats, order: NDArray[np.int64]) -> bool:
     """Replace a matrix (n, n) by its factors, with row exchanges in `order`; False if it is singular."""
     n = order.size
@@ -192,7 +192,7 @@ def factorise(system: Floats, order: NDArray[np.int64]) -> bool:
     return True
 
 
-@jit_lean_sum
+@linked_sum
 def solve(system: Floats, order: NDArray[np.int64], value: Floats) -> None:
     """Replace `value` (n,) by the solution with a factorised matrix."""
     n = order.size
@@ -211,7 +211,7 @@ def solve(system: Floats, order: NDArray[np.int64], value: Floats) -> None:
         value[k] = total / system[k, k]
 
 
-@jit_inline_sum
+@linked_sum
 def move_by_newton(work: CurvedWork) -> None:
     """Correct the loads by their residual and by its effect through the states."""
     n_load, point, state, n = work.load.shape[2], work.point, work.unknown, work.point.shape[1]
@@ -233,7 +233,7 @@ def move_by_newton(work: CurvedWork) -> None:
         point[LOADS, j] += point[MOVE, j]
 
 
-@jit_inline_sum
+@linked_sum
 def take_states(work: CurvedWork) -> None:
     """Copy h, its rate and the force of the single pair at the nodes from the last correction."""
     for node in range(1, N_NODE):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.contact_modes import add_rows, propagate
 from rubhpc.kernels.curved_contact import (
     BEFORE,
@@ -23,13 +23,13 @@ from rubhpc.kernels.curved_contact import (
 Floats = NDArray[np.float64]
 
 
-@jit_inline_sum
+@linked_sum
 def lone_pair(mask: int, q: int) -> int:
     """The closed pair where there is a single pair; else -1."""
     return 0 if q == 1 and mask == 1 else -1
 
 
-@jit_inline_sum
+@linked_sum
 def read_free(
     tables: CurvedTables, mode: int, level: int, z_re: Floats, z_im: Floats, work: CurvedWork
 ) -> None:
@@ -43,7 +43,7 @@ def read_free(
     add_rows(tables.reach[mode, level, :n_load], work.loads[:n_load], free)
 
 
-@jit_inline_sum
+@linked_sum
 def read_loaded(tables: CurvedTables, mode: int, level: int, work: CurvedWork) -> None:
     """Read the single pair at the nodes of a step of 2^level ticks under the loads at its nodes."""
     n_load, whole = work.load.shape[2], work.whole
@@ -52,7 +52,7 @@ def read_loaded(tables: CurvedTables, mode: int, level: int, work: CurvedWork) -
     add_rows(tables.reach[mode, level, n_load:], work.loads[n_load:], whole)
 
 
-@jit_inline_sum
+@linked_sum
 def take_motion(d: int, node: int, work: CurvedWork) -> None:
     """Fill the motion of the single pair at a node from its readings."""
     whole, motion, first = work.whole, work.motion, (node - 1) * (3 * d + 1)
@@ -62,7 +62,7 @@ def take_motion(d: int, node: int, work: CurvedWork) -> None:
         motion[1, 0, j] = whole[first + d + j]
 
 
-@jit_inline_sum
+@linked_sum
 def respond(tables: CurvedTables, mode: int, mask: int, first: int, n_node: int, work: CurvedWork) -> None:
     """Rates of the coordinates under the loads at the nodes `first` to `n_node`, into `work.response`."""
     for node in range(first, n_node):
@@ -75,7 +75,7 @@ def respond(tables: CurvedTables, mode: int, mask: int, first: int, n_node: int,
                 add_rows(tables.load_im[mode, i], work.load[node, i], im)
 
 
-@jit_lean_sum
+@linked_sum
 def add_responses(
     weight_re: Floats, weight_im: Floats, response: Floats, first: int, n_node: int, re: Floats, im: Floats
 ) -> None:
@@ -87,7 +87,7 @@ def add_responses(
             im[k] += w_re[k] * r_im[k] + w_im[k] * r_re[k]
 
 
-@jit_inline_sum
+@linked_sum
 def move_coordinates(
     tables: CurvedTables, mode: int, level: int, node: int, z: Floats, work: CurvedWork, target: Floats
 ) -> None:
@@ -98,7 +98,7 @@ def move_coordinates(
     add_responses(w_re, w_im, work.response, 0, N_NODE, target[0], target[1])
 
 
-@jit_inline_sum
+@linked_sum
 def leave_from(tables: CurvedTables, mode: int, mask: int, level: int, z: Floats, work: CurvedWork) -> None:
     """Fill `work.base` with the coordinates at the nodes under the loads at the beginning alone."""
     respond(tables, mode, mask, 0, 1, work)
@@ -110,7 +110,7 @@ def leave_from(tables: CurvedTables, mode: int, mask: int, level: int, z: Floats
         add_responses(w_re, w_im, work.response, 0, 1, base[0], base[1])
 
 
-@jit_inline_sum
+@linked_sum
 def arrive(tables: CurvedTables, mode: int, level: int, node: int, work: CurvedWork, target: Floats) -> None:
     """Coordinates (2, m) at a node where `leave_from` left, under the responses of `work`."""
     base, re, im = work.base[node - 1], target[0], target[1]
@@ -120,7 +120,7 @@ def arrive(tables: CurvedTables, mode: int, level: int, node: int, work: CurvedW
     add_responses(w_re, w_im, work.response, 1, N_NODE, re, im)
 
 
-@jit_inline_sum
+@linked_sum
 def predict_loads(mask: int, step: float, work: CurvedWork) -> None:
     """Loads at the nodes of a step (s) after the first, extrapolated from the step before."""
     q, n_load, ahead = work.load.shape[1], work.load.shape[2], work.ahead

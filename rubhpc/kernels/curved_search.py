@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.contact_modes import ModeTables, bounded, dot, event_free_interval
 from rubhpc.kernels.curved_contact import (
     ALL,
@@ -27,7 +27,7 @@ N_BISECTION = 24  # bisections that locate it to less than a tick of the longest
 N_NEWTON = 4  # iterations for a root beyond the step's end
 
 
-@jit_inline_sum
+@linked_sum
 def curved_free_interval(
     tables: ModeTables,
     curved: CurvedTables,
@@ -66,7 +66,7 @@ def curved_free_interval(
     return free
 
 
-@jit_lean_sum
+@linked_sum
 def open_crossing(
     tables: ModeTables,
     curved: CurvedTables,
@@ -101,13 +101,13 @@ def open_crossing(
     return crossing
 
 
-@jit_inline_sum
+@linked_sum
 def has_closed(gap: float, rate: float, overlap: float) -> bool:
     """Whether an open gap (m) with its rate (m/s) has closed, but for an `overlap` (m) as it parts."""
     return gap < -GAP_TOLERANCE and (rate < 0.0 or gap < -overlap)
 
 
-@jit_inline_sum
+@linked_sum
 def closed_crossing(closed: int, overlap: float, work: CurvedWork) -> int:
     """Set of the pairs whose force (closed) or gap (open) is negative at or between the nodes of a step.
 
@@ -129,7 +129,7 @@ def closed_crossing(closed: int, overlap: float, work: CurvedWork) -> int:
     return crossing
 
 
-@jit_inline_sum
+@linked_sum
 def first_crossing(closed: int, crossing: int, work: CurvedWork) -> float:
     """Fraction of a step at which the first of the pairs `crossing` reaches zero, by polynomials."""
     first = 1.0
@@ -140,7 +140,7 @@ def first_crossing(closed: int, crossing: int, work: CurvedWork) -> float:
     return first
 
 
-@jit_inline_sum
+@linked_sum
 def next_crossing(closed: int, work: CurvedWork) -> float:
     """Distance of the first zero of a force beyond the end of a step, over its length; infinite if none."""
     nearest = np.inf
@@ -151,7 +151,7 @@ def next_crossing(closed: int, work: CurvedWork) -> float:
     return nearest
 
 
-@jit_lean_sum
+@linked_sum
 def fill_course(closed: int, i: int, work: CurvedWork) -> None:
     """Fill `work.course` with the force of pair i, or its gap if open, by powers of the step's fraction."""
     course = work.course
@@ -163,7 +163,7 @@ def fill_course(closed: int, i: int, work: CurvedWork) -> None:
             course[power] += value * LAGRANGE[node, power]
 
 
-@jit_inline_sum
+@linked_sum
 def value_at(course: Floats, share: float) -> float:
     """Value of a polynomial by powers."""
     total = 0.0
@@ -172,7 +172,7 @@ def value_at(course: Floats, share: float) -> float:
     return total
 
 
-@jit_lean_sum
+@linked_sum
 def first_root(course: Floats) -> float:
     """First root between 0 and 1 of a polynomial that begins above zero; without a root, its minimum."""
     share, least, where = 0.0, np.inf, 0.0
@@ -195,7 +195,7 @@ def first_root(course: Floats) -> float:
     return before
 
 
-@jit_lean_sum
+@linked_sum
 def next_root(course: Floats) -> float:
     """Root of a polynomial beyond 1, by Newton's method; infinite where it does not fall."""
     share = 1.0
@@ -209,7 +209,7 @@ def next_root(course: Floats) -> float:
     return share if share >= 1.0 else np.inf
 
 
-@jit_lean_sum
+@linked_sum
 def lowest(value: Floats, first: int) -> float:
     """Least value, between the first and the third, of the parabola through three values at nodes."""
     a, b = NODES[first + 1] - NODES[first], NODES[first + 2] - NODES[first]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.contact_modes import add_rows
 from rubhpc.kernels.curved_contact import (
     ACROSS,
@@ -33,7 +33,7 @@ Floats = NDArray[np.float64]
 PULL, MOVING, PRESSING, GIVEN = range(4)
 
 
-@jit_lean_sum
+@linked_sum
 def fill_answers(
     pairs: CurvedPairs, tables: CurvedTables, mode: int, mask: int, node: int, work: CurvedWork
 ) -> bool:
@@ -138,14 +138,14 @@ def fill_answers(
     return True
 
 
-@jit_inline_sum
+@linked_sum
 def add_multiple(factor: float, row: Floats, target: Floats) -> None:
     """Add a row, times a factor, to the target."""
     for k in range(target.size):
         target[k] += factor * row[k]
 
 
-@jit_lean_sum
+@linked_sum
 def invert(mask: int, matrix: Floats, work: CurvedWork) -> bool:
     """Fill `work.inverse` with the inverse for the closed pairs (q, q); False where it is singular."""
     q, n = matrix.shape[0], 0
@@ -168,7 +168,7 @@ def invert(mask: int, matrix: Floats, work: CurvedWork) -> bool:
     return True
 
 
-@jit_lean_sum
+@linked_sum
 def combine(mask: int, state: int, follow: Floats, work: CurvedWork) -> None:
     """Rows of a state of all closed pairs: the inverse times `work.right`."""
     q, n = work.right.shape[0], 0
@@ -184,7 +184,7 @@ def combine(mask: int, state: int, follow: Floats, work: CurvedWork) -> None:
             n += 1
 
 
-@jit_lean_sum
+@linked_sum
 def fill_gradients(pairs: CurvedPairs, i: int, d: int, work: CurvedWork) -> None:
     """Derivatives of h of pair i, of its rate (at given rates) and of its normal's angle by the motions."""
     motion, rates, radius = work.motion[0, i], work.motion[1, i], pairs.radius[i]
@@ -208,7 +208,7 @@ def fill_gradients(pairs: CurvedPairs, i: int, d: int, work: CurvedWork) -> None
             turn[j] = -aslant * near * motion[j]
 
 
-@jit_lean_sum
+@linked_sum
 def fill_force_gradient(pairs: CurvedPairs, i: int, mask: int, d: int, node: int, work: CurvedWork) -> None:
     """Derivatives of the force balance of pair i by motions, `work.bending`, rates and free accelerations.
 

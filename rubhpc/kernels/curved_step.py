@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.curved_contact import (
     BEFORE,
     LARGEST,
@@ -72,7 +72,7 @@ QUICK = 5  # most sweeps of a step after which one twice as long may follow
 LEAST_TRAVEL = 0.01  # of the clearance: errors are relative to a force that moves the tip at least so far
 
 
-@jit_inline_sum
+@linked_sum
 def take_step(
     pairs: CurvedPairs,
     curved: CurvedTables,
@@ -201,7 +201,7 @@ def take_step(
     return True, growth
 
 
-@jit_inline_sum
+@linked_sum
 def sweep_alone(
     pairs: CurvedPairs,
     curved: CurvedTables,
@@ -225,7 +225,7 @@ def sweep_alone(
     return is_found
 
 
-@jit_inline_sum
+@linked_sum
 def sweep_all(
     pairs: CurvedPairs,
     curved: CurvedTables,
@@ -247,7 +247,7 @@ def sweep_all(
     return True
 
 
-@jit_inline_sum
+@linked_sum
 def go_on(mask: int, step: float, work: CurvedWork) -> None:
     """Make the end of a step (s) the beginning of the next one."""
     follow_loads(mask, step, step, work)
@@ -263,7 +263,7 @@ def go_on(mask: int, step: float, work: CurvedWork) -> None:
         work.gap[0, 0, i], work.gap[1, 0, i] = work.gap[0, end, i], work.gap[1, end, i]
 
 
-@jit_inline_sum
+@linked_sum
 def follow_loads(mask: int, step: float, past: float, work: CurvedWork) -> None:
     """Extrapolate the next loads from those of a step (s) that began a time `past` (s) before."""
     for i in range(work.load.shape[1]):

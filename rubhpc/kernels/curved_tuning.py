@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_lean_sum
+from rubhpc.kernels._jit import jit_sum, linked_sum
 from rubhpc.kernels.contact_modes import add_rows
 from rubhpc.kernels.curved_contact import CurvedTables  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.mode_change import product
@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 
-@jit_lean_sum
+@jit_sum
 def tune_curved(
     tables: CurvedTables,
     mode: int,
@@ -116,7 +116,7 @@ def tune_curved(
             tables.drain_moved[mode, n_loss + r, i] = product(force[r], tables.shift[mode, i])
 
 
-@jit_lean_sum
+@linked_sum
 def _see_loads(tables: CurvedTables, mode: int) -> None:
     """Fill what unit loads give of each coordinate's readings, of a single pair."""
     for j in range(tables.seen_re.shape[1]):

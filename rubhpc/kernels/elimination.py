@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_lean_sum
+from rubhpc.kernels._jit import linked_sum
 
 Floats = NDArray[np.float64]
 
 
-@jit_lean_sum
+@linked_sum
 def eliminate(rows: Floats, n: int) -> bool:
     """Turn the first n rows (A | B) into (. | A^-1 B), A (n, n); False where A is singular.
 

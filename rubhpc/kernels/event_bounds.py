@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, short_loops
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.friction_states import OPEN, state_of
 
@@ -21,8 +21,7 @@ CLOSE = 8  # share of a unit of ticks: a step is to end further than that behind
 FREE, SURE = range(2)  # rows of what is known of the switch functions
 
 
-@jit_inline_sum
-@short_loops
+@linked_sum
 def free_until(
     states: int,
     mode: int,
@@ -118,13 +117,13 @@ def free_until(
     return free_to, reached
 
 
-@jit_inline_sum
+@linked_sum
 def is_watched(states: int, j: int) -> bool:
     """Whether switch function j of a set of states is one: an open pair has one alone."""
     return j % 2 == 0 or state_of(states, j // 2) != OPEN
 
 
-@jit_inline_sum
+@linked_sum
 def ticks_beyond(value: float, rate: float, bend: float, tick: float, most: int) -> int:
     """Ticks (s), of few bits, shortly after the root of a parabola; about `most` at most."""
     root = np.sqrt(max(rate * rate - 2.0 * bend * value, 0.0))
@@ -137,7 +136,7 @@ def ticks_beyond(value: float, rate: float, bend: float, tick: float, most: int)
     return int(passed + unit if passed - count < unit // CLOSE else passed)
 
 
-@jit_inline_sum
+@linked_sum
 def positive_until(
     whole: tuple[float, float, float, float],
     slow: tuple[float, float, float, float],
@@ -160,7 +159,7 @@ def positive_until(
     return time
 
 
-@jit_inline_sum
+@linked_sum
 def is_positive(cubic: tuple[float, float, float, float], time: float) -> bool:
     """Whether `value + rate t + bend t^2 / 2 - turn t^3 / 6` is positive up to a time (s).
 
@@ -173,7 +172,7 @@ def is_positive(cubic: tuple[float, float, float, float], time: float) -> bool:
     return min(value, value + third, second, last) > 0.0
 
 
-@jit_inline_sum
+@linked_sum
 def falling_until(rate: float, bend: float, turn: float, begin: float) -> float:
     """Time (s) until which `rate + bend t + turn t^2 / 2` is negative from `begin` on; 0 where it is not."""
     if not rate + begin * (bend + 0.5 * begin * turn) < 0.0:

@@ -7,12 +7,11 @@ in some five pivots of a larger tableau, or finds that there are none.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline, jit_inline_sum, jit_lean
+from rubhpc.kernels._jit import linked, linked_sum
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.complementarity import UNSOLVED, solve_rows
 from rubhpc.kernels.contact_pairs import Workspace  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.coulomb_friction import ROUNDING, UNNOTICED, solve_cones
@@ -24,7 +23,7 @@ Floats = NDArray[np.float64]
 CLEARLY = 1e-9  # share by which expected forces are to be within the laws
 
 
-class FrictionWork(NamedTuple):
+class FrictionWork(Struct):
     """Work space of an event, q pairs."""
 
     solver: Workspace  # compliances are those of velocities, 1/kg
@@ -61,7 +60,7 @@ def friction_work(solver: Workspace, q: int) -> FrictionWork:
     )
 
 
-@jit_lean
+@linked
 def solve_event(bodies: FrictionBodies, work: FrictionWork, feeds_none: bool) -> int:
     """Forces or impulses that obey the laws with `solver.gap` and `slip`; pivots taken, or UNSOLVED.
 
@@ -95,7 +94,7 @@ def solve_event(bodies: FrictionBodies, work: FrictionWork, feeds_none: bool) ->
     return pivots
 
 
-@jit_inline
+@linked
 def slip_change(solver: Workspace, i: int) -> float:
     """Change of the slip of pair i by the forces found."""
     change = 0.0
@@ -106,7 +105,7 @@ def slip_change(solver: Workspace, i: int) -> float:
     return change
 
 
-@jit_inline
+@linked
 def gap_change(solver: Workspace, i: int) -> float:
     """Change of the gap of pair i by the forces found."""
     change = 0.0
@@ -115,7 +114,7 @@ def gap_change(solver: Workspace, i: int) -> float:
     return change
 
 
-@jit_inline_sum
+@linked_sum
 def expected_states(states: int, crossing: int, work: FrictionWork) -> int:
     """States that the pairs with a finite gap in `work.solver` are expected in, others open.
 
@@ -134,7 +133,7 @@ def expected_states(states: int, crossing: int, work: FrictionWork) -> int:
     return expected
 
 
-@jit_inline_sum
+@linked_sum
 def solve_expected(
     bodies: FrictionBodies, states: int, crossing: int, work: FrictionWork, feeds_none: bool
 ) -> int:
@@ -155,7 +154,7 @@ def solve_expected(
     return int(solve_event(bodies, work, feeds_none))
 
 
-@jit_inline_sum
+@linked_sum
 def sliding_instead(bodies: FrictionBodies, states: int, work: FrictionWork) -> int:
     """States in which pairs slide that stick with more friction than their cones of `work.solver` allow.
 
@@ -169,7 +168,7 @@ def sliding_instead(bodies: FrictionBodies, states: int, work: FrictionWork) -> 
     return found
 
 
-@jit_inline_sum
+@linked_sum
 def solve_active_pairs(bodies: FrictionBodies, states: int, work: FrictionWork) -> bool:
     """Forces of `work.solver` that stop `work.rest_speed` where `work.is_at_rest`; False where none do."""
     solver, q, rows = work.solver, work.rate.size, work.elimination
@@ -203,7 +202,7 @@ def solve_active_pairs(bodies: FrictionBodies, states: int, work: FrictionWork) 
     return True
 
 
-@jit_inline_sum
+@linked_sum
 def rub_of(bodies: FrictionBodies, states: int, i: int) -> float:
     """Traction of pair i for a unit normal force where it slides; 0 where it does not."""
     state = state_of(states, i)
@@ -211,7 +210,7 @@ def rub_of(bodies: FrictionBodies, states: int, i: int) -> float:
     return -bodies.sliding[i] if state == BACKWARD else rubs
 
 
-@jit_inline_sum
+@linked_sum
 def solve_states(bodies: FrictionBodies, states: int, work: FrictionWork) -> bool:
     """Forces with which pairs go on in a set of states, gaps at their targets; False where there are none."""
     solver, q = work.solver, work.rate.size
@@ -222,7 +221,7 @@ def solve_states(bodies: FrictionBodies, states: int, work: FrictionWork) -> boo
     return bool(solve_active_pairs(bodies, states, work))
 
 
-@jit_inline_sum
+@linked_sum
 def obeys_laws(bodies: FrictionBodies, states: int, work: FrictionWork, feeds_none: bool) -> bool:
     """Whether the forces found for a set of states clearly obey the laws; fills `solver.cone`, `active`."""
     solver, q = work.solver, work.rate.size

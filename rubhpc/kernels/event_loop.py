@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import jit_sum, linked_sum
 from rubhpc.kernels.case_progress import (
     FINISHED,
     MODE_WANTED,
@@ -60,7 +60,7 @@ Floats = NDArray[np.float64]
 ROUNDING = 4.0 * np.finfo(np.float64).eps  # of a switch function, over the sizes of its terms
 
 
-@jit_lean_sum
+@jit_sum
 def advance(
     tables: ModeTables,
     reduced: Reduced,
@@ -216,7 +216,7 @@ def advance(
         progress.halving_level = max(progress.halving_level - 1, NONE)
 
 
-@jit_lean_sum
+@linked_sum
 def note_resolution(
     tables: ModeTables, clock: Clock, highest_level: int, age: int, progress: Progress, z: Floats
 ) -> None:
@@ -225,7 +225,7 @@ def note_resolution(
     note_resolved(resolved, clock, highest_level, age, progress)
 
 
-@jit_inline_sum
+@linked_sum
 def find_crossing(
     closed: int,
     mode: int,
@@ -253,7 +253,7 @@ def find_crossing(
     return crossing
 
 
-@jit_inline_sum
+@linked_sum
 def stand_still(
     crossing: int,
     switch_re: Floats,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, short_loops
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.contact_modes import ModeTables, dot, used_width
 from rubhpc.kernels.coordinate_steps import floor_log2, go_on
 from rubhpc.kernels.event_bounds import FREE
@@ -30,7 +30,7 @@ DOUBTFUL = 0.01  # of what a function changes by in a tick: one that is nearer t
 KNOWN_BITS = 4  # of the first of them, behind the first bit
 
 
-@jit_inline_sum
+@linked_sum
 def find_change(
     states: int,
     mode: int,
@@ -63,7 +63,7 @@ def find_change(
     return crossing
 
 
-@jit_inline_sum
+@linked_sum
 def move_ticks(
     tables: ModeTables, bodies: FrictionBodies, mode: int, count: int, tick: float, z: Floats, target: Floats
 ) -> None:
@@ -79,13 +79,13 @@ def move_ticks(
         move_stuck(states, tables.n_eigenmode[mode], bodies.rim_speed, count * tick, z_re)
 
 
-@jit_inline_sum
+@linked_sum
 def longest_move(tables: ModeTables) -> int:
     """Ticks that can be passed at once: those of all levels of exponentials together."""
     return int((1 << tables.power_re.shape[1]) - 1)
 
 
-@jit_inline_sum
+@linked_sum
 def move_stuck(states: int, n_eigenmode: int, rim_speed: Floats, time: float, z_re: Floats) -> None:
     """Add to the displacements along the rims of pairs that stick what the rims move in a time (s)."""
     q = rim_speed.size
@@ -94,8 +94,7 @@ def move_stuck(states: int, n_eigenmode: int, rim_speed: Floats, time: float, z_
             z_re[n_eigenmode + 2 + q + i] += rim_speed[i] * time
 
 
-@jit_inline_sum
-@short_loops
+@linked_sum
 def look_ahead(
     tables: ModeTables,
     mode: int,
@@ -165,7 +164,7 @@ def look_ahead(
     return found, soon, is_clear, (behind if found != 0 else ahead) / tick
 
 
-@jit_inline_sum
+@linked_sum
 def root_between(
     tables: ModeTables,
     mode: int,
@@ -195,8 +194,7 @@ def root_between(
     return found
 
 
-@jit_inline_sum
-@short_loops
+@linked_sum
 def approach_change(
     tables: ModeTables,
     bodies: FrictionBodies,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_part_sum
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.accumulators import observe_force
 from rubhpc.kernels.case_progress import NONE, Clock, Progress, Sections, shaft_turn
 from rubhpc.kernels.contact_modes import (
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
-@jit_inline_sum
+@linked_sum
 def enter_wanted(
     tables: ModeTables,
     reduced: Reduced,
@@ -62,7 +62,7 @@ def enter_wanted(
     return True
 
 
-@jit_inline_sum
+@linked_sum
 def longest_step(
     clock: Clock, last_tick: int, highest_level: int, is_recorded: bool, is_ahead: bool, tick: int
 ) -> int:
@@ -77,7 +77,7 @@ def longest_step(
     return min(highest_level, floor_log2(reach - tick))
 
 
-@jit_inline_sum
+@linked_sum
 def contact_age(progress: Progress) -> int:
     """Level of the time since the last change of contacts.
 
@@ -86,14 +86,14 @@ def contact_age(progress: Progress) -> int:
     return floor_log2(max(1, progress.tick - progress.entered))
 
 
-@jit_inline_sum
+@linked_sum
 def note_resolved(resolved: float, clock: Clock, highest_level: int, age: int, progress: Progress) -> None:
     """Store the time (s) that resolves the contacts, at the level `age` of their duration."""
     ticks = min(resolved / clock.tick, 1.0 * (1 << highest_level))
     progress.contact_age, progress.resolved_level = age, floor_log2(int(max(1.0, ticks)))
 
 
-@jit_inline_sum
+@linked_sum
 def choose_step(clock: Clock, progress: Progress, longest: int, interval: float) -> tuple[int, bool]:
     """Level of the next step, at most `longest`, and whether it is certainly free of events.
 
@@ -114,7 +114,7 @@ def choose_step(clock: Clock, progress: Progress, longest: int, interval: float)
     return level, is_event_free
 
 
-@jit_inline_sum
+@linked_sum
 def sample_step(
     tables: ModeTables,
     clock: Clock,
@@ -134,7 +134,7 @@ def sample_step(
     progress.next_sample = first + count
 
 
-@jit_inline_sum
+@linked_sum
 def end_record(
     tables: ModeTables,
     clock: Clock,
@@ -150,7 +150,7 @@ def end_record(
         end_span(tables, clock, z, progress, recorder, accumulator)
 
 
-@jit_inline_sum
+@linked_sum
 def end_samples(
     tables: ModeTables,
     clock: Clock,
@@ -181,7 +181,7 @@ def end_samples(
     return bool(is_end)
 
 
-@jit_part_sum
+@linked_sum
 def note_section(
     tables: ModeTables,
     reduced: Reduced,
@@ -210,7 +210,7 @@ def note_section(
     )
 
 
-@jit_inline_sum
+@linked_sum
 def leave_mode(
     tables: ModeTables,
     reduced: Reduced,
@@ -231,7 +231,7 @@ def leave_mode(
     return end_mode(tables, reduced, clock, is_recorded, progress, z, motion, impulse, recorder, accumulator)
 
 
-@jit_inline_sum
+@linked_sum
 def end_mode(
     tables: ModeTables,
     reduced: Reduced,
@@ -255,7 +255,7 @@ def end_mode(
     return True
 
 
-@jit_inline_sum
+@linked_sum
 def count_event(clock: Clock, progress: Progress) -> None:
     """Count an event of a revolution; the count restarts with the first event after it."""
     if progress.tick - progress.counted_from > clock.samples_per_revolution << clock.sample_level:
@@ -263,7 +263,7 @@ def count_event(clock: Clock, progress: Progress) -> None:
     progress.n_event += 1
 
 
-@jit_inline_sum
+@linked_sum
 def record_event(
     clock: Clock, progress: Progress, before: Floats, i: int, samples: Samples, accumulator: Accumulator
 ) -> None:
@@ -275,7 +275,7 @@ def record_event(
         observe_force(i, progress.tick * clock.tick, 0.0, gained, 0.0, 0.0, accumulator)
 
 
-@jit_inline_sum
+@linked_sum
 def record_touch(i: int, is_closed: bool, accumulator: Accumulator) -> None:
     """Count a contact of pair i where an event closes it."""
     accumulator.n_contact[i] += 1 if is_closed and not accumulator.is_touching[i] else 0

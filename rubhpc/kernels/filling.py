@@ -6,12 +6,11 @@ follows from them in closed form, and so do exponentials.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit, jit_lean_sum
+from rubhpc.kernels._jit import jit, linked, linked_sum
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.contact_modes import STILL, ModeTables
 from rubhpc.kernels.courses import Courses, follow, follow_rates
 from rubhpc.kernels.filling_energies import Losses, fill_energies
@@ -21,7 +20,7 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 
-class ModeCourse(NamedTuple):
+class ModeCourse(Struct):
     """A contact mode over a range of speeds: m eigenmodes, its coordinates padded to the tables' width.
 
     n reduced degrees, r switch functions, o output rows.
@@ -41,7 +40,7 @@ class ModeCourse(NamedTuple):
     courses: Courses
 
 
-class Speeds(NamedTuple):
+class Speeds(Struct):
     """Speeds to which tables are filled, k of them, one after the other."""
 
     spin: Floats  # (k,), rad/s
@@ -66,7 +65,7 @@ def fill(tables: ModeTables, place: int, course: ModeCourse, speeds: Speeds, fir
         fill_at(tables, place + j, course, turning, speeds.factor[j], speeds.tick[j], speeds.interval[j])
 
 
-@jit
+@linked
 def fill_at(
     tables: ModeTables,
     mode: int,
@@ -136,7 +135,7 @@ def fill_at(
         fill_energies(tables, mode, losses, course.phasor, exponent, m, end, factor, seen)
 
 
-@jit_lean_sum
+@linked_sum
 def respond(re: Floats, im: Floats, shares: Floats, seen: Floats) -> None:
     """What rows (r, width), real and imaginary part, see of the response (2, r or more) by eigenmodes.
 
@@ -151,7 +150,7 @@ def respond(re: Floats, im: Floats, shares: Floats, seen: Floats) -> None:
         seen[0, a], seen[1, a] = real, imaginary
 
 
-@jit_lean_sum
+@linked_sum
 def _look(rows: Floats, moved: Floats, seen: Floats) -> None:
     """What r rows (r, c) see of a response (2, c), real and imaginary part."""
     for i in range(rows.shape[0]):

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit
+from rubhpc.kernels._jit import linked
+from rubhpc.kernels._struct import Struct
 
 if TYPE_CHECKING:
     from rubhpc.kernels.contact_modes import ModeTables
@@ -19,7 +20,7 @@ Ints = NDArray[np.int64]
 STEADY = 1e-13  # sum of two exponents over the greatest, below which it is zero but for rounding
 
 
-class Losses(NamedTuple):
+class Losses(Struct):
     """Forces and springs of a mode that energies follow from; empty where none are asked for."""
 
     resisting_re: Floats  # (n, width), resisting forces by coordinates; those of the response are filled in
@@ -33,7 +34,7 @@ class Losses(NamedTuple):
     speed: Floats  # (g,), m/s
 
 
-@jit
+@linked
 def fill_energies(
     tables: ModeTables,
     mode: int,
@@ -102,7 +103,7 @@ def fill_energies(
         _stretch_springs(loss, losses, motion_re, motion_im, m)
 
 
-@jit
+@linked
 def _follow_growth(loss: Floats, losses: Losses, turning: complex, first: int, x: Complexes) -> None:
     """Add the products of growing coordinates with the velocities `x` (n,) of the response.
 
@@ -128,7 +129,7 @@ def _follow_growth(loss: Floats, losses: Losses, turning: complex, first: int, x
         loss[there, here] += added
 
 
-@jit
+@linked
 def _stretch_springs(loss: Floats, losses: Losses, motion_re: Floats, motion_im: Floats, first: int) -> None:
     """Add the energy of springs by the response, the coordinate `first`."""
     n_spring, n = losses.gap.shape
@@ -150,7 +151,7 @@ def _stretch_springs(loss: Floats, losses: Losses, motion_re: Floats, motion_im:
                     loss[other, here] += form
 
 
-@jit
+@linked
 def _primitive(power: complex, exponent: complex, least: float) -> complex:
     """Power over its exponent, 1/s; zero where that is zero."""
     return power / exponent if abs(exponent) > least else 0j

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum, jit_part_sum
+from rubhpc.kernels._jit import linked_sum
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.case_progress import NONE
 from rubhpc.kernels.contact_modes import (
     FORCED_LEVEL,
@@ -27,7 +26,7 @@ MOST_REFINEMENTS = 30  # Newton steps to a root; two or three are usual
 SAME_TIME = 1e-14  # s, within which switch functions vanish together
 
 
-class PieceTables(NamedTuple):
+class PieceTables(Struct):
     """Tables of a contact mode to follow a piece: m coordinates, n reduced degrees, s switch functions."""
 
     switch_re: Floats  # (s, m), switch functions of the coordinates, real part of the product
@@ -50,7 +49,7 @@ class PieceTables(NamedTuple):
     displacement_limit: float  # m
 
 
-class PieceRoom(NamedTuple):
+class PieceRoom(Struct):
     """Work space of a piece."""
 
     switch: Floats  # (4, s), switch functions and their rates before and after a step
@@ -66,7 +65,7 @@ def piece_room(n_switch: int, width: int) -> PieceRoom:
 BEFORE, RATE_BEGUN, RATE_ENDED, GRADIENT = range(4)  # rows of the motions of a piece
 
 
-@jit_part_sum
+@linked_sum
 def follow_piece(
     tables: PieceTables,
     room: PieceRoom,
@@ -156,7 +155,7 @@ def follow_piece(
     return time, crossing
 
 
-@jit_inline_sum
+@linked_sum
 def next_event(
     tables: PieceTables,
     room: PieceRoom,
@@ -237,7 +236,7 @@ def next_event(
         halving = max(halving - 1, NONE)
 
 
-@jit_lean_sum
+@linked_sum
 def read_switches(
     switch_re: Floats,
     switch_im: Floats,
@@ -255,7 +254,7 @@ def read_switches(
             rate[j] = dot(rate_re[j], rate_im[j], z[0], z[1])
 
 
-@jit_inline_sum
+@linked_sum
 def below(value: Floats, floor: Floats) -> int:
     """Bits of the switch functions below their floors."""
     crossing = int(np.int64(0))  # no literal: callers are compiled for one type
@@ -265,7 +264,7 @@ def below(value: Floats, floor: Floats) -> int:
     return crossing
 
 
-@jit_lean_sum
+@linked_sum
 def move(exponent: Floats, drift: Floats, time: float, z_entered: Floats, z: Floats) -> None:
     """Coordinates (2, m) a time (s) after `z_entered`."""
     for k in range(z.shape[1]):
@@ -276,7 +275,7 @@ def move(exponent: Floats, drift: Floats, time: float, z_entered: Floats, z: Flo
         z[1, k] = re * z_entered[1, k] + im * z_entered[0, k]
 
 
-@jit_lean_sum
+@linked_sum
 def refine(
     tables: PieceTables,
     roots: Floats,

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline, jit_lean
+from rubhpc.kernels._jit import linked
 from rubhpc.kernels.cubics import turning_value
 
 Floats = NDArray[np.float64]
@@ -26,7 +26,7 @@ LOUD = 6  # row whose first number is the end of the last piece that may exceed 
 OLDEST, COUNT = range(2)  # columns of `held`
 
 
-@jit_inline
+@linked
 def part_of(piece: Floats, k: int, time: float) -> tuple[float, float]:
     """Impulse (N s) of a pair's piece k (6, n) up to a time in it, and the force (N) then.
 
@@ -41,7 +41,7 @@ def part_of(piece: Floats, k: int, time: float) -> tuple[float, float]:
     return s * (a + s * (quadratic + s * cubic)), (a + s * (2.0 * quadratic + 3.0 * s * cubic)) / length
 
 
-@jit_inline
+@linked
 def greatest_force(step: float, impulse: float, first: float, last: float, merged: float) -> float:
     """Bound on the force (N) of a piece and of those merged with it: Bernstein's bound of its parabola."""
     if not step > 0.0:
@@ -49,7 +49,7 @@ def greatest_force(step: float, impulse: float, first: float, last: float, merge
     return max(first, last, 3.0 * impulse / step - first - last, merged)
 
 
-@jit_lean
+@linked
 def add_force(
     i: int,
     begin: float,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline, jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import jit_sum, linked, linked_sum
 from rubhpc.kernels.accumulators import PRESSING, Accumulator, Samples
 from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
@@ -40,7 +40,7 @@ LEAVING = 1e-3  # of the cone, within which friction is a tick before it is outs
 MOST_EVENTS = 65536  # in a revolution; more are left to short steps
 
 
-@jit_inline_sum
+@linked_sum
 def take_change(
     tables: ModeTables,
     reduced: Reduced,
@@ -91,7 +91,7 @@ def take_change(
     return UNDER_WAY
 
 
-@jit_lean_sum
+@jit_sum
 def change_states(
     reduced: Reduced,
     bodies: FrictionBodies,
@@ -144,7 +144,7 @@ def change_states(
     return remaining
 
 
-@jit_inline
+@linked
 def state_by_forces(solver: Workspace, i: int, leaves: bool) -> int:
     """State in which closed pair i goes on, by its forces: within its cone it sticks.
 

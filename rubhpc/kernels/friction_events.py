@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean
+from rubhpc.kernels._jit import linked, linked_sum
 from rubhpc.kernels.accumulators import (
     IMPACT,
     IMPACT_LOSS,
@@ -31,7 +31,7 @@ from rubhpc.kernels.mode_change import AT_REST, OPENING, hidden_flight, least_fl
 Floats = NDArray[np.float64]
 
 
-@jit_lean
+@linked
 def observe_event(problem: int, pivots: int, solver: Workspace, accumulator: Accumulator) -> None:
     """Note what a problem has taken, and how far its solution is from the laws."""
     distance, moved = 0.0, 0.0
@@ -45,13 +45,13 @@ def observe_event(problem: int, pivots: int, solver: Workspace, accumulator: Acc
     observe_solution(problem, pivots, distance, moved, accumulator)
 
 
-@jit_inline_sum
+@linked_sum
 def takes_part(states: int, crossing: int, i: int) -> bool:
     """Whether an event with the switch functions `crossing` concerns pair i: it is closed, or closes."""
     return state_of(states, i) != OPEN or (crossing >> (2 * i)) & 1 == 1
 
 
-@jit_inline_sum
+@linked_sum
 def see_pairs(
     reduced: Reduced, bodies: FrictionBodies, states: int, crossing: int, motion: Floats, work: FrictionWork
 ) -> None:
@@ -65,7 +65,7 @@ def see_pairs(
             work.drawn[q + i] = product(bodies.pull[q + i], motion)
 
 
-@jit_inline_sum
+@linked_sum
 def give_impulses(reduced: Reduced, motion: Floats, work: FrictionWork) -> None:
     """Add the impulses that `work.solver` holds to the motion (2 n,), and to those of the event."""
     solver, velocity = work.solver, motion[motion.size // 2 :]
@@ -78,7 +78,7 @@ def give_impulses(reduced: Reduced, motion: Floats, work: FrictionWork) -> None:
                 velocity[k] += force * reduced.gap_jacobian[i, k] - traction * reduced.slip[i, k]
 
 
-@jit_inline_sum
+@linked_sum
 def collide(
     reduced: Reduced,
     bodies: FrictionBodies,
@@ -129,7 +129,7 @@ def collide(
     return True
 
 
-@jit_inline_sum
+@linked_sum
 def rate_without_forces(
     bodies: FrictionBodies, row: int, cosine: float, sine: float, work: FrictionWork
 ) -> float:
@@ -138,7 +138,7 @@ def rate_without_forces(
     return float(turned[0] * cosine + turned[1] * sine - work.drawn[row])
 
 
-@jit_inline_sum
+@linked_sum
 def part_pairs(
     reduced: Reduced, bodies: FrictionBodies, moment: float, cosine: float, sine: float, work: FrictionWork
 ) -> None:
@@ -161,7 +161,7 @@ def part_pairs(
         solver.target[i] = 0.0
 
 
-@jit_inline_sum
+@linked_sum
 def bring_to_rest(
     reduced: Reduced,
     bodies: FrictionBodies,
@@ -197,7 +197,7 @@ def bring_to_rest(
         work.slip[i] += slip_change(work.solver, i)
 
 
-@jit_lean
+@linked
 def observe_impacts(bodies: FrictionBodies, work: FrictionWork, accumulator: Accumulator) -> None:
     """Add impulses and their work, which is that of the mean of the velocities before and after."""
     solver = work.solver
@@ -215,7 +215,7 @@ def observe_impacts(bodies: FrictionBodies, work: FrictionWork, accumulator: Acc
             accumulator.energy[IMPACT_LOSS] -= solver.force[i] * (work.rate[i] + 0.5 * gap_change(solver, i))
 
 
-@jit_lean
+@linked
 def observe_states(states: int, accumulator: Accumulator) -> None:
     """Note the senses in which pairs slide in a set of states."""
     for i in range(accumulator.sense.size):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_lean_sum
+from rubhpc.kernels._jit import jit_sum
 from rubhpc.kernels.friction_loop import advance_with_friction
 from rubhpc.kernels.friction_pieces import advance_friction_pieces
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
-@jit_lean_sum
+@jit_sum
 def advance_friction(
     tables: ModeTables,
     reduced: Reduced,

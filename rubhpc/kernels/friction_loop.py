@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_part_sum
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.case_progress import (
     FINISHED,
     MODE_WANTED,
@@ -47,7 +47,7 @@ Floats = NDArray[np.float64]
 LONGEST = 128  # samples after which a span is ended without an event: its forces are bounded by its beginning
 
 
-@jit_part_sum
+@linked_sum
 def advance_with_friction(
     tables: ModeTables,
     reduced: Reduced,
@@ -225,7 +225,7 @@ def advance_with_friction(
             return outcome
 
 
-@jit_inline_sum
+@linked_sum
 def leading(count: int) -> int:
     """The count of ticks less all but its first bits; 0 of none."""
     unit = 1 << max(floor_log2(max(count, 1)) - FEW_BITS, 0)

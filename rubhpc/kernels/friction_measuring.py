@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_part_sum
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.accumulators import DAMPING_LOSS, observe_force, observe_rub
 from rubhpc.kernels.case_progress import Clock, Progress  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE, ModeTables, copy_coordinates
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
-@jit_part_sum
+@linked_sum
 def observe_span(
     tables: ModeTables,
     bodies: FrictionBodies,
@@ -52,7 +52,7 @@ def observe_span(
             given[i] = 0.0
 
 
-@jit_inline_sum
+@linked_sum
 def pass_parts(
     tables: ModeTables,
     bodies: FrictionBodies,
@@ -101,7 +101,7 @@ def pass_parts(
         here, spare, now = there, here, stop
 
 
-@jit_inline_sum
+@linked_sum
 def pass_part(
     tables: ModeTables,
     bodies: FrictionBodies,
@@ -145,7 +145,7 @@ def pass_part(
     return impulse
 
 
-@jit_inline_sum
+@linked_sum
 def add_rubs(
     tables: ModeTables,
     bodies: FrictionBodies,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum, jit_part_sum
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
     DIVERGED,
@@ -60,7 +60,7 @@ AT_REST = 1e-4  # of the rim speed: a pair that slips less than that at the begi
 LEAST_FORCE = float(np.finfo(float).tiny)  # N, of a closed pair
 
 
-@jit_part_sum
+@linked_sum
 def advance_friction_pieces(
     tables: ModeTables,
     reduced: Reduced,
@@ -139,7 +139,7 @@ def advance_friction_pieces(
     return FINISHED
 
 
-@jit_lean_sum
+@linked_sum
 def turn_unbalance(reduced: Reduced, bodies: FrictionBodies) -> None:
     """Set `bodies.turned` by the unbalance of `reduced`."""
     q = reduced.radius.size
@@ -149,7 +149,7 @@ def turn_unbalance(reduced: Reduced, bodies: FrictionBodies) -> None:
             bodies.turned[place, 1] = product(row, reduced.force_sine)
 
 
-@jit_lean_sum
+@linked_sum
 def first_states(reduced: Reduced, bodies: FrictionBodies, motion: Floats, pressing: Floats) -> int:
     """States with which a piece begins but for what forces make of them, as pairs press (N) and slip."""
     q, n = reduced.gap_jacobian.shape
@@ -167,7 +167,7 @@ def first_states(reduced: Reduced, bodies: FrictionBodies, motion: Floats, press
     return found
 
 
-@jit_inline_sum
+@linked_sum
 def closed_set(states: int, q: int) -> int:
     """Set of the pairs that are not open, a bit each."""
     found = int(np.int64(0))
@@ -177,7 +177,7 @@ def closed_set(states: int, q: int) -> int:
     return found
 
 
-@jit_lean_sum
+@linked_sum
 def read_pressing(tables: ModeTables, bodies: FrictionBodies, mode: int, z: Floats, force: Floats) -> None:
     """Fill in the normal forces (q,), N, of coordinates (2, m); of a pair that sticks by its two cones."""
     for i in range(force.size):

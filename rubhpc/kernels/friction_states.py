@@ -6,12 +6,11 @@ force. This is a further bit per pair, after those of all states.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum
+from rubhpc.kernels._jit import jit_sum, linked_sum
+from rubhpc.kernels._struct import Struct
 
 Floats = NDArray[np.float64]
 
@@ -20,7 +19,7 @@ MOST_PAIRS = 31  # whose states fit into an integer
 MOST_SOFT_PAIRS = 20  # likewise, with the bits of lifted pairs
 
 
-class FrictionBodies(NamedTuple):
+class FrictionBodies(Struct):
     """Properties of the reduced bodies for set-valued friction, q pairs."""
 
     sliding: Floats  # (q,), coefficient
@@ -32,19 +31,19 @@ class FrictionBodies(NamedTuple):
     turned: Floats  # (2 q, 2), times the cosine and the sine of the shaft's angle
 
 
-@jit_inline_sum
+@jit_sum
 def state_of(states: int, i: int) -> int:
     """State of pair i in a set of states."""
     return (states >> (2 * i)) & 3
 
 
-@jit_inline_sum
+@jit_sum
 def lifted_place(q: int, i: int) -> int:
     """Place of the bit for pair i of q being lifted."""
     return 2 * q + i
 
 
-@jit_inline_sum
+@linked_sum
 def stuck_pairs(states: int) -> int:
     """Bits of the sticking pairs, two places per pair; 0 where none sticks."""
     return states & (states >> 1) & 0x1555555555555555

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, short_loops
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.contact_modes import ModeTables, copy_coordinates, dot, used_width
 from rubhpc.kernels.coordinate_steps import turn_on
 from rubhpc.kernels.cubics import turning_value
@@ -28,8 +28,7 @@ SHORTER = 4  # ratio of lengths
 FOLLOWED = 4e-4  # of a signal's size: its eighth derivative times the panel to the eighth
 
 
-@jit_inline_sum
-@short_loops
+@linked_sum
 def rub_through(
     tables: ModeTables,
     bodies: FrictionBodies,
@@ -115,15 +114,14 @@ def rub_through(
     return total + gained * before, least, most
 
 
-@jit_inline_sum
+@linked_sum
 def even_panel(left: int, longest: int) -> int:
     """Ticks of a panel, `longest` at most, for as few equal parts as those that are left need."""
     n_part = max(1, (left + N_PANEL * longest - 1) // (N_PANEL * longest))
     return max(1, left // (N_PANEL * n_part)) if left >= N_PANEL else 0
 
 
-@jit_inline_sum
-@short_loops
+@linked_sum
 def resolved_panel(tables: ModeTables, mode: int, i: int, z: Floats) -> float:
     """Length of a panel, s, by which the quadrature follows force and slip of sliding pair i from (2, m).
 
@@ -146,8 +144,7 @@ def resolved_panel(tables: ModeTables, mode: int, i: int, z: Floats) -> float:
     return float(np.sqrt(np.sqrt(np.sqrt(FOLLOWED * eighth))))
 
 
-@jit_inline_sum
-@short_loops
+@linked_sum
 def gains(
     tables: ModeTables, mode: int, i: int, time: float, here: Floats, there: Floats
 ) -> tuple[float, float]:

@@ -6,11 +6,12 @@ CONTRIBUTING.md describes how to add one.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.kernels._jit import jit_inline
+from rubhpc.kernels._jit import linked
+from rubhpc.kernels._struct import Struct
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,7 +24,7 @@ SLIDING, COULOMB, STRIBECK, TABLE = range(4)
 _NO_TABLE = np.zeros(0)
 
 
-class Law(NamedTuple):
+class Law(Struct):
     """Laws of a case; all fields but the first have the names of the keys of `[contact]`."""
 
     friction_law: int = SLIDING  # one of the numbers above
@@ -39,13 +40,13 @@ class Law(NamedTuple):
 MULTIPLIER = Law()
 
 
-@jit_inline
+@linked
 def is_set_valued(law: Law) -> bool:
     """Whether friction may stick and reverse, instead of steady sliding by the spin."""
     return law.friction_law != SLIDING
 
 
-@jit_inline
+@linked
 def friction_coefficient(law: Law, friction: float, slip_speed: float, is_sticking: bool) -> float:
     """Largest friction for a unit normal force.
 
@@ -66,7 +67,7 @@ def friction_coefficient(law: Law, friction: float, slip_speed: float, is_sticki
     return friction * (law.static_friction_ratio if is_sticking else 1.0)
 
 
-@jit_inline
+@linked
 def interpolated(at: NDArray[np.float64], values: NDArray[np.float64], x: float) -> float:
     """Linear interpolation at x between ascending places; constant beyond the last one."""
     for i in range(1, at.size):
@@ -76,31 +77,31 @@ def interpolated(at: NDArray[np.float64], values: NDArray[np.float64], x: float)
     return float(values[-1])
 
 
-@jit_inline
+@linked
 def is_penalty(law: Law) -> bool:
     """Whether a force may act with the gap open at the end of a step."""
     return law.stiffness > 0.0
 
 
-@jit_inline
+@linked
 def is_bouncing(law: Law) -> bool:
     """Whether impacts have restitution."""
     return law.restitution > 0.0
 
 
-@jit_inline
+@linked
 def is_plain(law: Law) -> bool:
     """Whether gaps are closed by multipliers under steady sliding: forces then follow from the gaps alone."""
     return not (is_penalty(law) or is_bouncing(law) or is_set_valued(law))
 
 
-@jit_inline
+@linked
 def softness(law: Law, step: float) -> float:
     """Compliance of the penalty over a step, m/N: one over (k/4 + c/(2 h)); a multiplier has none."""
     return 1.0 / (0.25 * law.stiffness + 0.5 * law.damping / step) if is_penalty(law) else 0.0
 
 
-@jit_inline
+@linked
 def gap_target(law: Law, step: float, gap: float, opening: float, end: float) -> tuple[float, float]:
     """Gap required at the end of a step, less its compression by the force (m), and delay of an impact (s).
 
@@ -126,7 +127,7 @@ def gap_target(law: Law, step: float, gap: float, opening: float, end: float) ->
     return 0.0, 0.0
 
 
-@jit_inline
+@linked
 def bounce(restitution: float, step: float, gap: float, opening: float, end: float) -> tuple[float, float]:
     """Gap required at the end of a step with an impact (m), and delay of the impact in the step (s).
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_lean
+from rubhpc.kernels._jit import jit, linked
 from rubhpc.kernels.complementarity import UNSOLVED
 
 Floats = NDArray[np.float64]
@@ -21,7 +21,7 @@ TIE = 1e-12
 PIVOTS_A_ROW = 20
 
 
-@jit_lean
+@linked
 def exchange(tableau: Floats, basis: Ints, n: int, row: int, column: int) -> int:
     """Exchange the variable of `column` into the basis at `row`, of n rows; returns the one that leaves."""
     width = 2 * n + 2
@@ -38,7 +38,7 @@ def exchange(tableau: Floats, basis: Ints, n: int, row: int, column: int) -> int
     return int(leaving)
 
 
-@jit_lean
+@jit
 def solve_lemke(tableau: Floats, basis: Ints, n: int) -> int:
     """Solve a problem of n rows; returns the number of pivots, or UNSOLVED.
 

@@ -11,18 +11,17 @@ and C are banded throughout and stored by diagonals, as in `scipy.sparse.dia_arr
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline
+from rubhpc.kernels._jit import linked
+from rubhpc.kernels._struct import Struct
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-class Linear(NamedTuple):
+class Linear(Struct):
     """Blocks of the linear bodies; rows `start[b]:start[b + 1]` of a state vector are block b."""
 
     start: Ints  # (n_block + 1,)
@@ -39,7 +38,7 @@ class Linear(NamedTuple):
     force_sine: Floats  # (n_force,), N
 
 
-@jit_inline
+@linked
 def add_diagonals(values: Floats, span: Ints, x: Floats, y: Floats) -> None:
     """Add `A x` to `y` (n,), with `A[j - offset, j] = values[k, j]` for columns j of diagonal k's span."""
     for k in range(span.shape[0]):
@@ -49,7 +48,7 @@ def add_diagonals(values: Floats, span: Ints, x: Floats, y: Floats) -> None:
             target[i] += value[i] * source[i]
 
 
-@jit_inline
+@linked
 def add_columns(columns: Floats, x: Floats, y: Floats) -> None:
     """Add `columns.T @ x` to `y` (n,), four columns a pass: `y` is read and written a quarter as often."""
     n = y.size
@@ -65,7 +64,7 @@ def add_columns(columns: Floats, x: Floats, y: Floats) -> None:
             y[i] += a[i] * p
 
 
-@jit_inline
+@linked
 def free_velocity(
     linear: Linear,
     step: float,
@@ -97,7 +96,7 @@ def free_velocity(
         add_columns(linear.inverse[b], residual[first:last], velocity_next[first:last])
 
 
-@jit_inline
+@linked
 def circulatory_power(linear: Linear, displacement: Floats, velocity: Floats) -> float:
     """Power drawn by the skew part of K (cross-coupled bearings), W."""
     power = 0.0

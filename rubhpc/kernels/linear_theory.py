@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import jit_sum, linked_sum
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.contact_modes import add_rows
 from rubhpc.kernels.mode_change import product
 from rubhpc.kernels.small_changes import add_rows_twice
@@ -21,7 +20,7 @@ NEUTRAL = 1e12  # times the energy of the first period, in all periods: what doe
 FIRST, LAST, BEGINS, ENDS = range(4)  # items of `Watched.parts`
 
 
-class Theory(NamedTuple):
+class Theory(Struct):
     """A monodromy matrix (m, m) of rank r, `M = sum over a of span[a] reading[a]^T`.
 
     After one period a distance d is in the space of the `span`, at `y = reading @ d`, and goes on by
@@ -34,7 +33,7 @@ class Theory(NamedTuple):
     sums: Floats  # (r, r), S: energies of all periods to come are y' S y
 
 
-@jit_lean_sum
+@jit_sum
 def fill_theory(monodromy: Floats, scale: Floats, energy: Floats, rooms: Floats) -> tuple[int, bool]:
     """Fill in the theory of a monodromy matrix (m, m): its rank, and whether disturbances decay.
 
@@ -84,7 +83,7 @@ def fill_theory(monodromy: Floats, scale: Floats, energy: Floats, rooms: Floats)
     return rank, is_stable
 
 
-@jit_lean_sum
+@linked_sum
 def find_span(
     monodromy: Floats, scale: Floats, span: Floats, reading: Floats, scaled: Floats, left: Floats
 ) -> int:
@@ -130,7 +129,7 @@ def find_span(
     return rank
 
 
-@jit_inline_sum
+@linked_sum
 def multiply(n: int, first: Floats, second: Floats, found: Floats) -> None:
     """Product of the leading (n, n) parts of two matrices."""
     for i in range(n):
@@ -142,7 +141,7 @@ def multiply(n: int, first: Floats, second: Floats, found: Floats) -> None:
         add_rows(second, first[n - 1, :n], found[n - 1, :n])
 
 
-class Watched(NamedTuple):
+class Watched(Struct):
     """Gaps and forces at t times of a periodic motion, in s parts, each of one function along a piece."""
 
     parts: Ints  # (s, 4), first time and that after the last, and whether it vanishes at each of these ends
@@ -151,7 +150,7 @@ class Watched(NamedTuple):
     onward: Floats  # (r, t), by y
 
 
-@jit_lean_sum
+@jit_sum
 def keeps_contacts(
     theory: Theory, watched: Watched, apart: Floats, n_period: int, least: float, work: Floats
 ) -> bool:
@@ -199,7 +198,7 @@ def keeps_contacts(
     return True
 
 
-@jit_inline_sum
+@linked_sum
 def is_kept(value: Floats, begins: bool, ends: bool) -> bool:
     """Whether values along a piece are positive, but for times by the ends where the function vanishes."""
     n = value.size

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum, jit_part_sum
+from rubhpc.kernels._jit import jit_sum, linked_sum
 from rubhpc.kernels.accumulators import (
     DAMPING_LOSS,
     UNBALANCE_WORK,
@@ -34,7 +34,7 @@ Ints = NDArray[np.int64]
 FORCE, FORCE_RATE, SLIP, SLIP_RATE = range(4)  # rows of `Recorder.node`
 
 
-@jit_inline_sum
+@linked_sum
 def read_contact(
     tables: ModeTables, reduced: Reduced, mode: int, i: int, z_re: Floats, z_im: Floats
 ) -> tuple[float, float, float, float]:
@@ -47,7 +47,7 @@ def read_contact(
     )
 
 
-@jit_inline_sum
+@linked_sum
 def resolved_contact(tables: ModeTables, mode: int, z_re: Floats, z_im: Floats) -> float:
     """Time, s, over which cubics follow force and slip of the pairs closed in contact mode `mode`."""
     time = np.inf
@@ -62,7 +62,7 @@ def resolved_contact(tables: ModeTables, mode: int, z_re: Floats, z_im: Floats) 
     return time
 
 
-@jit_inline_sum
+@linked_sum
 def leave_out_dying(pace: Floats, z: Floats, calm: Floats) -> None:
     """Fill `calm` (2, m) with the coordinates that outlast the first step: no cubic follows the others."""
     for k in range(z.shape[1]):
@@ -70,7 +70,7 @@ def leave_out_dying(pace: Floats, z: Floats, calm: Floats) -> None:
         calm[0, k], calm[1, k] = (0.0, 0.0) if dies else (z[0, k], z[1, k])
 
 
-@jit_inline_sum
+@linked_sum
 def force_in_step(
     before: float, rate_before: float, after: float, rate_after: float, step: float
 ) -> tuple[float, float]:
@@ -80,7 +80,7 @@ def force_in_step(
     return impulse, 0.5 * (before + after) + 0.125 * bend
 
 
-@jit_inline_sum
+@linked_sum
 def begin_contact(
     tables: ModeTables, reduced: Reduced, mode: int, z: Floats, calm: Floats, recorder: Recorder
 ) -> None:
@@ -96,7 +96,7 @@ def begin_contact(
             recorder.node[SLIP, i], recorder.node[SLIP_RATE, i] = slip, slip_rate
 
 
-@jit_inline_sum
+@linked_sum
 def observe_step(
     tables: ModeTables,
     reduced: Reduced,
@@ -143,7 +143,7 @@ def observe_step(
         accumulator.energy[DAMPING_LOSS] += drive - friction_work
 
 
-@jit_lean_sum
+@linked_sum
 def energies_gained(tables: ModeTables, mode: int, begun: Floats, z: Floats, gained: Floats) -> None:
     """Fill `gained` (2,), J, with damping loss and unbalance work between coordinates (2, m) of a mode.
 
@@ -186,7 +186,7 @@ def energies_gained(tables: ModeTables, mode: int, begun: Floats, z: Floats, gai
     gained[0] = loss
 
 
-@jit_inline_sum
+@linked_sum
 def work_form(tables: ModeTables, mode: int, z_re: Floats, z_im: Floats) -> float:
     """What grows by the work of the unbalance, J."""
     first = tables.n_eigenmode[mode]
@@ -202,14 +202,14 @@ def work_form(tables: ModeTables, mode: int, z_re: Floats, z_im: Floats) -> floa
     return work
 
 
-@jit_inline_sum
+@linked_sum
 def begin_span(z: Floats, progress: Progress, recorder: Recorder) -> None:
     """Begin to add energies at the current tick, where the coordinates are `z` (2, m)."""
     copy_coordinates(z, recorder.begun)
     progress.energy_from = progress.tick
 
 
-@jit_part_sum
+@jit_sum
 def end_span(
     tables: ModeTables,
     clock: Clock,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import jit_sum, linked_sum
 from rubhpc.kernels.accumulators import (
     IMPACT,
     IMPACT_LOSS,
@@ -26,7 +26,7 @@ HIDDEN = 8.0 * GAP_TOLERANCE  # m, first speed squared over deceleration of a fl
 SUSTAINED = 0.08  # the same over the overlap that followed modes may leave as a pair opens
 
 
-@jit_inline_sum
+@linked_sum
 def hidden_flight(reduced: Reduced) -> float:
     """First speed squared over deceleration, m, of flights that are not resolved.
 
@@ -36,7 +36,7 @@ def hidden_flight(reduced: Reduced) -> float:
     return max(HIDDEN, SUSTAINED * reduced.overlap)
 
 
-@jit_inline_sum
+@linked_sum
 def least_flight(acceleration: float, moment: float, hidden: float) -> float:
     """Time (s) within which a pair that parts has to be pressed together to count as closed.
 
@@ -48,7 +48,7 @@ def least_flight(acceleration: float, moment: float, hidden: float) -> float:
     return float(np.sqrt(hidden / pressed)) if 0.0 < pressed * moment * moment < hidden else moment
 
 
-@jit_inline_sum
+@linked_sum
 def product(a: Floats, b: Floats) -> float:
     """Inner product; `np.dot` would call a library for a dozen numbers."""
     total = 0.0
@@ -57,7 +57,7 @@ def product(a: Floats, b: Floats) -> float:
     return total
 
 
-@jit_lean_sum
+@jit_sum
 def change_contacts(
     reduced: Reduced,
     closed: int,
@@ -149,7 +149,7 @@ def change_contacts(
     return remaining
 
 
-@jit_inline_sum
+@linked_sum
 def observe_impact(
     reduced: Reduced, i: int, spin: float, impulse: float, velocity: Floats, accumulator: Accumulator
 ) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_part_sum
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.accumulators import observe_force
 from rubhpc.kernels.contact_modes import DYING, RESOLVED, ModeTables, copy_coordinates, dot
 from rubhpc.kernels.coordinate_steps import floor_log2
@@ -28,7 +28,7 @@ SETTLED = 0.125
 FIRST = 1 / 32  # of the averaging time: length of the first piece after an event, if that follows the force
 
 
-@jit_inline_sum
+@linked_sum
 def resolved_force(tables: ModeTables, mode: int, i: int, age: float, z: Floats) -> float:
     """Time, s, over which a parabola with its impulse follows the force of closed pair i from (2, m).
 
@@ -50,7 +50,7 @@ def resolved_force(tables: ModeTables, mode: int, i: int, age: float, z: Floats)
     return float(np.sqrt(np.sqrt(0.25 * RESOLVED * spared * whole / bend))) if bend > 0.0 else np.inf
 
 
-@jit_inline_sum
+@linked_sum
 def recent_impulse(i: int, time: float, accumulator: Accumulator) -> float:
     """What impacts have given to pair i within the averaging time before a `time` (s), N s."""
     piece, most = accumulator.force_piece[i], accumulator.force_piece.shape[2]
@@ -64,7 +64,7 @@ def recent_impulse(i: int, time: float, accumulator: Accumulator) -> float:
     return given
 
 
-@jit_part_sum
+@linked_sum
 def follow_force(
     tables: ModeTables,
     bodies: FrictionBodies,
@@ -110,7 +110,7 @@ def follow_force(
         at, ahead = ahead, at
 
 
-@jit_inline_sum
+@linked_sum
 def force_at(tables: ModeTables, mode: int, i: int, share: float, is_stuck: bool, z: Floats) -> float:
     """Normal force of closed pair i, N, at coordinates (2, m)."""
     force = dot(tables.switch_re[mode, 2 * i], tables.switch_im[mode, 2 * i], z[0], z[1])

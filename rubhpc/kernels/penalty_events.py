@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_lean_sum
+from rubhpc.kernels._jit import jit_sum, linked_sum
 from rubhpc.kernels.contact_modes import Reduced  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.mode_change import product
 
@@ -20,21 +20,21 @@ Floats = NDArray[np.float64]
 MOST_PAIRS = 31  # whose states fit into an integer
 
 
-@jit_lean_sum
+@linked_sum
 def gap_of(reduced: Reduced, i: int, motion: Floats) -> float:
     """Gap of pair i, m, of a reduced motion (2 n,)."""
     n = reduced.gap_jacobian.shape[1]
     return float(reduced.clearance[i] + product(reduced.gap_jacobian[i], motion[:n]))
 
 
-@jit_lean_sum
+@linked_sum
 def force_of(reduced: Reduced, i: int, motion: Floats) -> float:
     """Force of the spring and damper of pair i, N, in a motion (2 n,); negative where they would pull."""
     rate = product(reduced.gap_jacobian[i], motion[reduced.gap_jacobian.shape[1] :])
     return float(-reduced.spring * gap_of(reduced, i, motion) - reduced.damper * rate)
 
 
-@jit_lean_sum
+@jit_sum
 def pressed_pairs(reduced: Reduced, motion: Floats) -> int:
     """States of the pairs in a motion (2 n,) without a history."""
     q = reduced.gap_jacobian.shape[0]
@@ -45,7 +45,7 @@ def pressed_pairs(reduced: Reduced, motion: Floats) -> int:
     return found
 
 
-@jit_lean_sum
+@linked_sum
 def pressed_or_lifted(
     reduced: Reduced, i: int, is_crossed: bool, is_pressed: bool, is_lifted: bool, motion: Floats
 ) -> tuple[bool, bool]:
@@ -60,7 +60,7 @@ def pressed_or_lifted(
     return not is_lifted or gap_of(reduced, i, motion) < 0.0, False
 
 
-@jit_lean_sum
+@jit_sum
 def change_pressed(reduced: Reduced, states: int, crossing: int, motion: Floats) -> int:
     """States after the switch functions `crossing` (bits) vanish, in a motion (2 n,)."""
     q = reduced.gap_jacobian.shape[0]

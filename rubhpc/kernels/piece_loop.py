@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_lean_sum
+from rubhpc.kernels._jit import jit_sum, linked_sum
 from rubhpc.kernels.case_progress import DIVERGED, FINISHED, MODE_WANTED, Clock, Progress, Sections
 from rubhpc.kernels.contact_modes import ModeTables, Reduced, dot
 from rubhpc.kernels.event_loop import advance
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
-@jit_lean_sum
+@jit_sum
 def advance_pieces(
     tables: ModeTables,
     reduced: Reduced,
@@ -121,7 +121,7 @@ def advance_pieces(
     return FINISHED
 
 
-@jit_lean_sum
+@linked_sum
 def first_set(reduced: Reduced, motion: Floats, pressing: Floats) -> int:
     """Set of closed pairs with which a piece begins, in a motion (2 n,) with contact forces (q,), N."""
     if reduced.spring > 0.0:
@@ -133,7 +133,7 @@ def first_set(reduced: Reduced, motion: Floats, pressing: Floats) -> int:
     return found
 
 
-@jit_lean_sum
+@linked_sum
 def read_forces(tables: ModeTables, mode: int, z: Floats, force: Floats) -> None:
     """Fill in the contact forces (q,), N, of coordinates (2, m)."""
     for i in range(force.size):

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import inlined, linked_sum
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.accumulators import Accumulator
 from rubhpc.kernels.case_progress import LONG_AGO, NONE, Clock, Progress
 from rubhpc.kernels.contact_modes import DYING, ModeTables, Reduced, enter, find_mode, is_within, leave
@@ -27,7 +28,7 @@ TO_BEGIN, TO_ENTER, PART_TO_BEGIN, IN_PART = range(4)  # stages of a piece
 FAST, QUICK = 3.0, 0.5 * np.pi
 
 
-class Pieces(NamedTuple):
+class Pieces(Struct):
     """The k pieces with the same matrices and number of samples, in c parts each."""
 
     spin: Floats  # (k,), rad/s
@@ -75,7 +76,7 @@ NO_PIECES = Pieces(
 )
 
 
-@jit_inline_sum
+@inlined
 def clock_of(clock: Clock, pieces: Pieces, piece: int) -> Clock:
     """Clock of a piece, from that of any other."""
     return Clock(
@@ -90,7 +91,7 @@ def clock_of(clock: Clock, pieces: Pieces, piece: int) -> Clock:
     )
 
 
-@jit_inline_sum
+@linked_sum
 def start_piece(reduced: Reduced, pieces: Pieces, piece: int, recorder: Recorder, samples: Samples) -> None:
     """Set unbalance and rims to the speed of a piece, and clear the arrays for its samples."""
     for k in range(reduced.force_cosine.size):
@@ -105,7 +106,7 @@ def start_piece(reduced: Reduced, pieces: Pieces, piece: int, recorder: Recorder
             samples.whole[row, j] = 0.0
 
 
-@jit_inline_sum
+@linked_sum
 def end_piece(pieces: Pieces, piece: int, n_step: int, standing: int, z: Floats, samples: Samples) -> None:
     """Store the samples of a piece and continue with the next."""
     pieces.n_step[piece] = n_step
@@ -120,14 +121,14 @@ def end_piece(pieces: Pieces, piece: int, n_step: int, standing: int, z: Floats,
     pieces.at[PIECE], pieces.at[STAGE] = piece + 1, TO_BEGIN
 
 
-@jit_inline_sum
+@linked_sum
 def set_masks(mask: Ints, table: Ints, n_room: int, piece: int) -> None:
     """Enable only the tables that are tuned to a piece."""
     for place in range(mask.size):
         mask[place] = table[place] if place % n_room == piece % n_room else NONE
 
 
-@jit_lean_sum
+@linked_sum
 def begin_piece(
     tables: ModeTables,
     reduced: Reduced,
@@ -160,7 +161,7 @@ def begin_piece(
     return True
 
 
-@jit_inline_sum
+@linked_sum
 def begin_part(
     pieces: Pieces, progress: Progress, part: Accumulator, before: Accumulator, closed: int
 ) -> None:
@@ -181,7 +182,7 @@ def begin_part(
         part.is_touching[i] = (closed >> i) & 1 == 1
 
 
-@jit_lean_sum
+@linked_sum
 def end_part(
     tables: ModeTables, reduced: Reduced, pieces: Pieces, mode: int, z: Floats, part: Accumulator
 ) -> bool:
@@ -203,7 +204,7 @@ def end_part(
     return True
 
 
-@jit_inline_sum
+@inlined
 def row_of(sums: Accumulator, i: int) -> Accumulator:
     """The sums of one part."""
     return Accumulator(

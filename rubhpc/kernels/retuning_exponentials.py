@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit
+from rubhpc.kernels._jit import linked
 from rubhpc.kernels.contact_modes import DYING, FORCED_LEVEL, ModeTables
 
 Floats = NDArray[np.float64]
@@ -15,7 +15,7 @@ SQUARED = 4  # levels of exponentials, of which one is evaluated and the others 
 GONE = -40.0  # exponent of what has died away
 
 
-@jit
+@linked
 def retune_powers(tables: ModeTables, mode: int, exponent: Complexes, end: int, tick: float) -> None:
     """Exponentials of the first `end` coordinates."""
     n_level = tables.power_re.shape[1]
@@ -34,7 +34,7 @@ def retune_powers(tables: ModeTables, mode: int, exponent: Complexes, end: int, 
                 re[k], im[k] = a * a - b * b, 2.0 * (a * b)
 
 
-@jit
+@linked
 def retune_bounds(
     tables: ModeTables, mode: int, exponent: Complexes, end: int, tick: float, interval: float
 ) -> None:
@@ -57,7 +57,7 @@ def retune_bounds(
                 turn[k] = bound[k] * edge[k]
 
 
-@jit
+@linked
 def retune_outputs(
     output: Floats, row: Complexes, exponent: Complexes, end: int, interval: float, n_ahead: int
 ) -> None:
@@ -84,7 +84,7 @@ def retune_outputs(
             ahead *= onward
 
 
-@jit
+@linked
 def exponential(exponent: complex, time: float) -> complex:
     """Exponential over a time, s, in a quarter of the time of one that looks for infinite arguments."""
     size, turn = np.exp(exponent.real * time), exponent.imag * time

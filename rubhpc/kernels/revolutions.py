@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_lean_sum
+from rubhpc.kernels._jit import jit_sum
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.accumulators import Accumulator  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.contact_modes import Reduced, find_mode
 from rubhpc.kernels.flow import BEFORE, PieceRoom, PieceTables, follow_piece
@@ -26,7 +25,7 @@ PIECE, STATES, REVOLUTION, BEGUN = range(4)  # items of `reached`
 AFTER = 4  # row of the motions of a piece, after those of `flow.follow_piece`
 
 
-class PieceModes(NamedTuple):
+class PieceModes(Struct):
     """The p contact modes of a case, with the fields of `flow.PieceTables`."""
 
     mask: Ints  # (p,)
@@ -51,7 +50,7 @@ class PieceModes(NamedTuple):
     shape_im: Floats
 
 
-class PieceRows(NamedTuple):
+class PieceRows(Struct):
     """Pieces of a motion, one per row."""
 
     states: Ints  # (k, 4), states in the piece, `crossing`, the gaps among these, states after the event
@@ -72,7 +71,7 @@ def piece_rows(k: int, width: int, n_switch: int, q: int) -> PieceRows:
     )
 
 
-@jit_lean_sum
+@jit_sum
 def follow_revolutions(
     modes: PieceModes,
     reduced: Reduced,

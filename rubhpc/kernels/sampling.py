@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_apart_sum, jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import linked_sum
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.accumulators import (
     HORIZONTAL,
     TWIST,
@@ -30,7 +29,7 @@ from rubhpc.kernels.cubics import turning_value
 Floats = NDArray[np.float64]
 
 
-class Recorder(NamedTuple):
+class Recorder(Struct):
     """Work space of a case's measures, for o output rows and q pairs; made by `recorder`."""
 
     value: Floats  # (SAMPLES_AT_ONCE o,), outputs sample by sample
@@ -64,7 +63,7 @@ def with_coordinates(recorder: Recorder, m: int) -> Recorder:
     return recorder._replace(begun=np.zeros((2, m)), path=np.zeros((4, 2, m)))
 
 
-@jit_inline_sum
+@linked_sum
 def read_outputs(output: Floats, mode: int, z_re: Floats, z_im: Floats, n_value: int, value: Floats) -> None:
     """Fill the first `n_value` outputs from the modal coordinates; their number is a multiple of four.
 
@@ -89,7 +88,7 @@ def read_outputs(output: Floats, mode: int, z_re: Floats, z_im: Floats, n_value:
                 )
 
 
-@jit_inline_sum
+@linked_sum
 def take_samples(
     tables: ModeTables,
     mode: int,
@@ -130,7 +129,7 @@ def take_samples(
     )
 
 
-@jit_apart_sum
+@linked_sum
 def read_samples(
     output: Floats,
     mode: int,
@@ -150,7 +149,7 @@ def read_samples(
     store_samples(value, n_row, first, count, rotor, axial, lateral, probe)
 
 
-@jit_inline_sum
+@linked_sum
 def store_samples(
     value: Floats,
     n_row: int,
@@ -178,7 +177,7 @@ def store_samples(
             probe[i, first + j] = value[start + first_probe + i]
 
 
-@jit_lean_sum
+@linked_sum
 def widen_extrema(
     value: Floats,
     count: int,

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import jit_sum, linked_sum
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.accumulators import Accumulator  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.contact_modes import Reduced  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.elimination import eliminate
@@ -52,7 +51,7 @@ NEXT, BEST, N_PIECE, BEGINS, ENDS, ITERATION, TRIED, HAS_DERIVATIVE, IS_FRESH, C
 RESIDUAL, SHARE = range(2)  # items of `Search.share`
 
 
-class Search(NamedTuple):
+class Search(Struct):
     """A search under way; n reduced degrees."""
 
     now: Ints  # (11,)
@@ -81,7 +80,7 @@ def new_search(width: int) -> Search:
     )
 
 
-@jit_lean_sum
+@jit_sum
 def search_period(
     modes: PieceModes,
     reduced: Reduced,
@@ -235,7 +234,7 @@ def search_period(
             begin_trial(int(now[ENDS]), search, reached, passed, motion, least)
 
 
-@jit_inline_sum
+@linked_sum
 def take_trial(spin: float, search: Search, n_piece: int, states: int, motion: Floats) -> bool:
     """Make the trial that has come to `motion` the best one, if its residual is less by enough."""
     now, tried = search.now, search.tried
@@ -256,7 +255,7 @@ def take_trial(spin: float, search: Search, n_piece: int, states: int, motion: F
     return True
 
 
-@jit_lean_sum
+@linked_sum
 def distance(first: Floats, second: Floats, spin: float) -> float:
     """Root of v'v + spin^2 u'u of the difference of two motions (2 n,)."""
     n = first.size // 2
@@ -267,7 +266,7 @@ def distance(first: Floats, second: Floats, spin: float) -> float:
     return float(np.sqrt(square))
 
 
-@jit_inline_sum
+@linked_sum
 def begin_carrying(next_one: int, search: Search) -> None:
     """Carry the derivative from the first piece on: that of no piece is the identity."""
     now, columns = search.now, search.columns
@@ -278,7 +277,7 @@ def begin_carrying(next_one: int, search: Search) -> None:
         columns[i, i] = 1.0
 
 
-@jit_lean_sum
+@linked_sum
 def invert(search: Search) -> bool:
     """Invert the identity less the derivative; False where it is singular."""
     rows, columns = search.rows, search.columns
@@ -291,7 +290,7 @@ def invert(search: Search) -> bool:
     return eliminate(rows, n)
 
 
-@jit_lean_sum
+@linked_sum
 def begin_trial(
     states: int, search: Search, reached: Ints, passed: Floats, motion: Floats, least: Floats
 ) -> None:
@@ -305,7 +304,7 @@ def begin_trial(
     least[:] = np.inf
 
 
-@jit_lean_sum
+@linked_sum
 def shortest_period(rows: PieceRows, n_piece: int, period: int, spin: float, search: Search) -> int:
     """Pieces of the best trial until it closes for the first time, after a divisor of the period."""
     same, n_revolution = SAME * size_of(search.motion, spin), 0

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_apart_sum, jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import jit_sum, linked_sum
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.contact_modes import Reduced, add_rows, find_mode
 from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.elimination import eliminate
@@ -23,7 +22,7 @@ NO_IMPULSE = 1e-12  # of the largest impulse of an event
 STOPPED = 1e-9  # of the rim's speed: what slips less after an impact sticks
 
 
-class ChangeRoom(NamedTuple):
+class ChangeRoom(Struct):
     """Work space for k small changes; m coordinates, n reduced degrees, q pairs."""
 
     z_re: Floats  # (m, k), their coordinates
@@ -52,7 +51,7 @@ def change_room(m: int, n: int, q: int, k: int) -> ChangeRoom:
     )
 
 
-@jit_lean_sum
+@jit_sum
 def carry_pieces(
     modes: PieceModes,
     reduced: Reduced,
@@ -119,7 +118,7 @@ def carry_pieces(
     return ALL_CARRIED
 
 
-@jit_lean_sum
+@linked_sum
 def move_changes(
     n_moving: int,
     exponent: Floats,
@@ -158,7 +157,7 @@ def move_changes(
             add_rows_twice(z, shape[row, :n_moving], shape[n + row, :n_moving], first, second)
 
 
-@jit_apart_sum
+@linked_sum
 def add_rows_twice(rows: Floats, a: Floats, b: Floats, first: Floats, second: Floats) -> None:
     """Add rows (k or more, m), times values (k,), to two targets (m,) of their own: four rows at a time."""
     n_whole = a.size - a.size % 4
@@ -176,7 +175,7 @@ def add_rows_twice(rows: Floats, a: Floats, b: Floats, first: Floats, second: Fl
             second[j] += b_w * last[j]
 
 
-@jit_lean_sum
+@linked_sum
 def saltate(
     reduced: Reduced,
     has_states: bool,
@@ -227,13 +226,13 @@ def saltate(
             target[j] += change * row[j]
 
 
-@jit_inline_sum
+@linked_sum
 def gain_of(room: ChangeRoom, i: int) -> Floats:
     """Impulse i, by the velocities before it, (n,)."""
     return room.rows[i, room.rows.shape[0] :]
 
 
-@jit_lean_sum
+@linked_sum
 def impulses_of(reduced: Reduced, has_states: bool, given: Floats, velocity: Floats, room: ChangeRoom) -> int:
     """Fill in what an impact makes of velocities: `dv+ = dv- - F (R F)^-1 R dv-`; returns the rows of R.
 

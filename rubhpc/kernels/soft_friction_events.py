@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_lean_sum
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.contact_modes import Reduced  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.event_forces import FrictionWork  # noqa: TC001 - likewise
 from rubhpc.kernels.friction_states import OPEN, STUCK, lifted_place, state_of
@@ -20,7 +20,7 @@ from rubhpc.kernels.penalty_events import force_of, pressed_or_lifted
 Floats = NDArray[np.float64]
 
 
-@jit_lean_sum
+@linked_sum
 def press_pairs(
     reduced: Reduced,
     states: int,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, short_loops
+from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.force_average import AVERAGING_TIME
 from rubhpc.kernels.friction_states import STUCK, FrictionBodies, state_of
 
@@ -28,8 +28,7 @@ MISSED = float(np.sqrt(3.0)) / 216.0  # of the third derivative times the length
 SHARED = 1.5  # by how much the mean of a parabola with the impulse of a part may exceed its own, in its terms
 
 
-@jit_inline_sum
-@short_loops
+@linked_sum
 def begin_force(
     tables: ModeTables,
     bodies: FrictionBodies,
@@ -96,7 +95,7 @@ def begin_force(
     pair[RUBBED] = along * (gained - (other_primitive - primitive))
 
 
-@jit_inline_sum
+@linked_sum
 def pass_force(
     tables: ModeTables,
     bodies: FrictionBodies,
@@ -129,8 +128,7 @@ def pass_force(
     return before, value, impulse, most
 
 
-@jit_inline_sum
-@short_loops
+@linked_sum
 def read_force(tables: ModeTables, mode: int, j: int, z: Floats) -> tuple[float, float]:
     """Switch function j without what is gone within a sample, and its primitive."""
     re, im, whole_re, whole_im, turn = (
@@ -150,7 +148,7 @@ def read_force(tables: ModeTables, mode: int, j: int, z: Floats) -> tuple[float,
     return value, primitive
 
 
-@jit_inline_sum
+@linked_sum
 def highest(mean: float, first: float, last: float) -> float:
     """Largest value of a parabola with this mean and these values at the ends of a part."""
     slope, bend = 6.0 * mean - 4.0 * first - 2.0 * last, 3.0 * (first + last) - 6.0 * mean

@@ -9,12 +9,11 @@ stator's axis is a lower bound.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_lean_sum
+from rubhpc.kernels._jit import jit_sum, linked_sum
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.accumulators import (
     DAMPING_LOSS,
     STEP,
@@ -39,7 +38,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-class ContactImpulses(NamedTuple):
+class ContactImpulses(Struct):
     """Action of contact forces on the modes of the open system; q pairs of 5 degrees each, m modes."""
 
     level: int  # steps in contact last 2^level ticks
@@ -56,7 +55,7 @@ class ContactImpulses(NamedTuple):
     probe_response: Floats  # (n_probe, 5 q), immediate reading of an acceleration probe for a unit force
 
 
-@jit_lean_sum
+@linked_sum
 def book_step(
     reduced: Reduced,
     skew: Floats,
@@ -94,7 +93,7 @@ def book_step(
     energy[UNBALANCE_WORK] += gain
 
 
-@jit_lean_sum
+@linked_sum
 def take_back(
     impulses: ContactImpulses,
     work: Workspace,
@@ -121,7 +120,7 @@ def take_back(
         now[a] += moved
 
 
-@jit_lean_sum
+@jit_sum
 def advance_by_steps(
     tables: ModeTables,
     reduced: Reduced,

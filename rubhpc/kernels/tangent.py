@@ -10,12 +10,11 @@ a contact mode.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline_sum, jit_lean_sum
+from rubhpc.kernels._jit import jit_sum, linked_sum
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.complementarity import solve_active
 from rubhpc.kernels.contact_modes import ModeTables, Reduced, add_rows, copy_coordinates, dot, leave
 from rubhpc.kernels.coordinate_steps import floor_log2, turn_on
@@ -32,7 +31,7 @@ LOST = 1e-280  # a smaller displacement counts as zero
 PIECE, REVOLUTION, PASSED, IS_ENTERED = range(4)  # items of `Tangent.reached`
 
 
-class TrailModes(NamedTuple):
+class TrailModes(Struct):
     """The k distinct contact modes of a trail."""
 
     of_piece: Ints  # (room + 1,), contact mode of each piece
@@ -44,7 +43,7 @@ class TrailModes(NamedTuple):
     slips_evenly: bool  # whether a pair that sticks begins to slide with the friction that it has
 
 
-class Tangent(NamedTuple):
+class Tangent(Struct):
     """A displacement of a motion and work space; m coordinates, n reduced degrees, q pairs."""
 
     reached: Ints  # (4,), piece, revolution, ticks passed, whether the first mode is entered
@@ -83,7 +82,7 @@ def new_tangent(m: int, q: int, generic: Floats, n_revolution: int) -> Tangent:
     )
 
 
-@jit_lean_sum
+@jit_sum
 def carry_along(
     tables: ModeTables,
     reduced: Reduced,
@@ -174,7 +173,7 @@ def carry_along(
         reached[PIECE] = k + 1
 
 
-@jit_lean_sum
+@linked_sum
 def move(tables: ModeTables, place: int, n_tick: int, z: Floats) -> None:
     """Advance coordinates (2, m) by `n_tick` ticks."""
     power_re, power_im = tables.power_re[place], tables.power_im[place]
@@ -184,7 +183,7 @@ def move(tables: ModeTables, place: int, n_tick: int, z: Floats) -> None:
         left -= most
 
 
-@jit_inline_sum
+@linked_sum
 def add_rate(time: float, exponent: Floats, drift: Floats, z: Floats, d: Floats) -> None:
     """Add the change of a motion z in a time, s, to a displacement d, both (2, m)."""
     for i in range(z.shape[1]):
@@ -193,7 +192,7 @@ def add_rate(time: float, exponent: Floats, drift: Floats, z: Floats, d: Floats)
         d[1, i] += growth * z[1, i] + turning * z[0, i]
 
 
-@jit_lean_sum
+@linked_sum
 def enter_displacement(tables: ModeTables, place: int, cosine: float, sine: float, tangent: Tangent) -> None:
     """Fill the coordinates from `tangent.motion` and from a change of the shaft's cosine and sine."""
     for part in range(2):
@@ -204,7 +203,7 @@ def enter_displacement(tables: ModeTables, place: int, cosine: float, sine: floa
         add_rows(tables.enter_re[place] if part == 0 else tables.enter_im[place], tangent.motion, target)
 
 
-@jit_lean_sum
+@linked_sum
 def size_of(motion: Floats, spin: float) -> float:
     """Root of v'v + spin^2 u'u of a motion (2 n,)."""
     n = motion.size // 2
@@ -215,7 +214,7 @@ def size_of(motion: Floats, spin: float) -> float:
     return float(np.sqrt(square))
 
 
-@jit_lean_sum
+@linked_sum
 def strike_motion(
     reduced: Reduced, has_states: bool, impulse: Floats, rate: Floats, tangent: Tangent
 ) -> None:
@@ -235,7 +234,7 @@ def strike_motion(
                 moved[k] += given * reduced.force_direction[i, k]
 
 
-@jit_lean_sum
+@linked_sum
 def strike(reduced: Reduced, has_states: bool, impulse: Floats, rate: Floats, tangent: Tangent) -> None:
     """Fill `tangent.given` with the impulses of the derivative of an impact: `dv+ = dv- - F (R F)^-1 R dv-`.
 
@@ -287,7 +286,7 @@ def strike(reduced: Reduced, has_states: bool, impulse: Floats, rate: Floats, ta
             tangent.given[1, i] -= tangent.found[q + i]
 
 
-@jit_inline_sum
+@linked_sum
 def along(reduced: Reduced, has_states: bool, row: Floats, j: int, share: float) -> float:
     """Product of a row (n,) with the direction of the impulse of pair j."""
     if has_states:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_inline
+from rubhpc.kernels._jit import linked
+from rubhpc.kernels._struct import Struct
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -17,7 +16,7 @@ MOST_EVENTS = 2**14
 BROKEN = -1  # instead of the number of events: there was no room for all, or short steps between them
 
 
-class Trail(NamedTuple):
+class Trail(Struct):
     """Pieces of a motion; m modal coordinates, q pairs. Without room none are stored.
 
     Piece k + 1 begins where event k ends piece k.
@@ -60,7 +59,7 @@ def begin_trail(trail: Trail, states: int, z: Floats) -> None:
     trail.n_event[0], trail.states[0], trail.begun[0] = 0, states, z
 
 
-@jit_inline
+@linked
 def note_event(trail: Trail, tick: int, crossing: int) -> None:
     """Store an event."""
     room, k = trail.tick.size, trail.n_event[0]
@@ -71,7 +70,7 @@ def note_event(trail: Trail, tick: int, crossing: int) -> None:
             trail.tick[k], trail.crossing[k] = tick, crossing
 
 
-@jit_inline
+@linked
 def note_after(trail: Trail, rate: Floats, slip: Floats, given: Floats) -> None:
     """Store rates of gaps and slips (q,), m/s, after the event, and its impulses (2, q)."""
     k = trail.n_event[0]
@@ -81,7 +80,7 @@ def note_after(trail: Trail, rate: Floats, slip: Floats, given: Floats) -> None:
             trail.given[k, 0, i], trail.given[k, 1, i] = given[0, i], given[1, i]
 
 
-@jit_inline
+@linked
 def note_piece(trail: Trail, states: int, z: Floats) -> None:
     """Store the states and coordinates (2, m) after the event."""
     k = trail.n_event[0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels._jit import jit_lean_sum
+from rubhpc.kernels._jit import jit_sum, linked_sum
 from rubhpc.kernels.contact_modes import Reduced, add_rows, find_mode
 from rubhpc.kernels.linear_theory import BEGINS, ENDS, FIRST, LAST
 from rubhpc.kernels.revolutions import AFTER, PieceModes, PieceRows
@@ -17,7 +17,7 @@ Ints = NDArray[np.int64]
 PIECE, N_TIME, N_PART = range(3)  # items of `reached`
 
 
-@jit_lean_sum
+@jit_sum
 def watch_pieces(
     modes: PieceModes,
     reduced: Reduced,
@@ -101,7 +101,7 @@ def watch_pieces(
     return ALL_CARRIED
 
 
-@jit_lean_sum
+@linked_sum
 def enter_changes(
     n_moving: int, enter_re: Floats, enter_im: Floats, room: ChangeRoom, columns: Floats
 ) -> None:
@@ -116,7 +116,7 @@ def enter_changes(
         add_rows_twice(columns, from_re, from_im, re, im)
 
 
-@jit_lean_sum
+@linked_sum
 def watch_function(
     n_moving: int,
     exponent: Floats,

@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.case import compile_kernels, kernel_sets
-from rubhpc.integrate.compilation import expect_sets
 from rubhpc.running.beginning import begin, begin_part
-from rubhpc.running.case_setup import set_up_for_kernels
 from rubhpc.running.stopping import Stopped, Stopping
+from rubhpc.running.warm_up import warm_up
 from rubhpc.schema import FAILED, MISSING
 from rubhpc.storage.disk import disk_errors
 from rubhpc.storage.in_progress import forget, read_deaths
@@ -192,22 +190,11 @@ def _with_followers(grid: CaseGrid, suspect: dict[int, int], missing: NDArray[np
 
 
 def _warm_up(grid: CaseGrid, block: Block, stopping: Stopping) -> None:
-    """Compile every kernel once, on two revolutions: concurrent compilations into one cache have crashed."""
+    """Compile every kernel on one rank, while the others wait."""
 
     def check() -> None:
         if stopping.look():
             raise Stopped
 
     with suppress(Exception):  # an error will be reported as the reason of these cases
-        cases = grid.with_each_law(block.start)
-        setups = [set_up_for_kernels(grid.study, case) for case in cases]
-        changes = cases[0].speed_law is not None
-        expect_sets(set().union(*(kernel_sets(setup, changes_speed=changes) for setup in setups)))
-        for case, setup in zip(cases, setups, strict=True):
-            compile_kernels(
-                setup,
-                clearance=case.clearance,
-                friction=case.friction,
-                recording=grid.study.recording,
-                check=check,
-            )
+        warm_up(grid, block.start, check)

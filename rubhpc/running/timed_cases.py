@@ -14,14 +14,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rubhpc.integrate.branches.case import BranchRecord
-from rubhpc.integrate.case import compile_kernels
 from rubhpc.integrate.changing_speed.case import RunUpRecord
 from rubhpc.integrate.compilation import is_compiling, seconds_compiling
-from rubhpc.running.case_setup import case_for_kernels, set_up_for_kernels
 from rubhpc.running.kept_setups import KeptSetups
 from rubhpc.running.memory import memory, peak_memory
 from rubhpc.running.plan_estimate import relative_error
 from rubhpc.running.trail import Timed, Trail
+from rubhpc.running.warm_up import WARM, load_kernels, part_of
 from rubhpc.running.worker import record_of
 from rubhpc.schema import FINAL_STATE
 from rubhpc.study.speed_law import SpeedLaw
@@ -48,7 +47,6 @@ _MOST_RUN_UP = 2.7e9  # bytes of contact modes of a run-up, about: those of othe
 _AGAIN = 0.25  # s: a case with one stator that takes less is run twice
 _LATE = 0.2  # s after its end at which a case is cut that does not ask
 MOST_BYTES = 800e6  # of this process, above which a case is cut
-_WARM = 4  # checks, and revolutions, that a case is run to load its kernels
 
 
 class Enough(BaseException):  # no error: what cuts a case, whatever it is doing
@@ -180,7 +178,7 @@ class CaseTimer:
         self.sample.memory = self.sample.memory or peak_memory()
         self._begun = self._begun or time.process_time()
         law = case.speed_law
-        if isinstance(law, SpeedLaw) and law.n_revolution >= _PARTS * _WARM:
+        if isinstance(law, SpeedLaw) and law.n_revolution >= _PARTS * WARM:
             timed = self._time_run_up(case, law, steps, limit)
         else:
             timed = self._time(case, steps, limit)
@@ -202,28 +200,7 @@ class CaseTimer:
         if case.contact in self._ready:
             return
         compiled, began = seconds_compiling(), time.process_time()
-        if case.speed_law is None and self._study.branch is None:
-            compile_kernels(
-                set_up_for_kernels(self._study, case),
-                clearance=case.clearance,
-                friction=case.friction,
-                recording=self._study.recording,
-                check=self._limit(math.inf),
-            )
-        else:
-            n_check = iter(range(_WARM))
-
-            def check() -> None:
-                if next(n_check, None) is None:
-                    raise Enough
-
-            short = case_for_kernels(self._study, case)
-            if isinstance(
-                law := short.speed_law, SpeedLaw
-            ):  # a whole one takes seconds to be cut into pieces
-                short = replace(short, speed_law=part_of(law, 0, min(law.n_revolution, _WARM)))
-            with suppress(Enough):
-                record_of(self._grid, short, KeptSetups(self._study), None, check)
+        load_kernels(self._grid, case, self._limit(math.inf))
         self._ready.add(case.contact)
         if seconds_compiling() > compiled:
             self.sample.has_compiled = True
@@ -336,14 +313,6 @@ def spread(missing: NDArray[np.bool_], most: int) -> Iterator[Index]:
         if len(seen) < min(most, flat.size) and index not in seen:
             seen.add(index)
             yield index
-
-
-def part_of(law: SpeedLaw, first: int, last: int) -> SpeedLaw:
-    """A law from one revolution to another."""
-    (begin, end), speeds, _ = law.at_angle(2.0 * np.pi * np.array([first, last * (1.0 + 1e-9)]))
-    inner = [(t, v) for t, v in zip(law.time, law.speed, strict=True) if begin < t < end]
-    times, values = zip(*[(begin, speeds[0]), *inner, (end, speeds[1])], strict=True)
-    return SpeedLaw(time=tuple(map(float, times)), speed=tuple(map(float, values)))
 
 
 def arrays_of(record: Record | RunUpRecord) -> dict[str, NDArray[Any]]:

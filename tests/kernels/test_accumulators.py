@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from calling import called
 from kernel_case import KernelCase
 
 from rubhpc import read_rig
@@ -22,6 +23,8 @@ from rubhpc.kernels.accumulators import (
 from rubhpc.kernels.central_difference import FINISHED
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, TORSION
 from rubhpc.rig.parts import Bearing
+
+observe_contact = called(observe_contact)
 
 PACKAGED = read_rig("mokhtar2017")
 RIG = replace(

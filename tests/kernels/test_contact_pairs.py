@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from calling import called, interpreted
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import root
 
 from rubhpc.integrate.marches.workspace import workspace
-from rubhpc.kernels._jit import plain
 from rubhpc.kernels.complementarity import UNSOLVED
 from rubhpc.kernels.contact_forces import fill_residual
 from rubhpc.kernels.contact_forces import solve_contact as compiled_solve_contact
@@ -29,7 +29,13 @@ from rubhpc.kernels.contact_pairs import (
 from rubhpc.kernels.laws import COULOMB as COULOMB_LAW
 from rubhpc.kernels.laws import MULTIPLIER
 
-solve_contact = plain(compiled_solve_contact)  # motions have it compiled; alone it takes 12 s to compile
+fill_residual = called(fill_residual)
+force_on_disc = called(force_on_disc)
+is_any_closed = called(is_any_closed)
+
+solve_contact = interpreted(
+    compiled_solve_contact
+)  # motions have it compiled; alone it takes 12 s to compile
 COULOMB = MULTIPLIER._replace(friction_law=COULOMB_LAW)
 RADIUS, CLEARANCE = 0.06, 1e-4
 STEP, SPIN = 1e-6, 150.0  # s, rad/s

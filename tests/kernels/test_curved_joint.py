@@ -4,10 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from calling import interpreted
 from scipy.optimize import fsolve
 
-from rubhpc.kernels import curved_slopes
-from rubhpc.kernels._jit import plain
 from rubhpc.kernels.curved_contact import ALL, N_NODE, curved_work, is_closed
 from rubhpc.kernels.curved_joint import find_joint_system, move_jointly
 from rubhpc.kernels.curved_loads import LOADS, MISSED, MOVE
@@ -17,13 +16,6 @@ RADIUS, CLEARANCE, ASIDE, FRICTION = 0.05, 1e-4, 2e-5, 0.3
 CLOSED = (0, 2)  # of three pairs
 MASK = sum(1 << i for i in CLOSED)
 N_STATE = 3
-
-
-@pytest.fixture(autouse=True)
-def _uncompiled(monkeypatch):
-    """Whatever the kernels call of their own module."""
-    for name in ("add_multiple", "invert", "combine", "fill_gradients", "fill_force_gradient"):
-        monkeypatch.setattr(curved_slopes, name, plain(getattr(curved_slopes, name)))
 
 
 class Pairs:
@@ -118,7 +110,7 @@ def test_slopes_are_those_of_the_equations(n_bending, is_round):
         load_re=np.random.default_rng(4).normal(size=(1, 3, d + 2, m)),
         load_im=np.zeros((1, 3, d + 2, m)),
     )
-    assert plain(fill_answers)(pairs.kernel_pairs(), tables, 0, MASK, node, work)
+    assert interpreted(fill_answers)(pairs.kernel_pairs(), tables, 0, MASK, node, work)
     slopes = work.follow[node - 1, : N_STATE * len(CLOSED)]
     assert slopes[:, 1] == pytest.approx(2.0 * slopes[:, 0])
     scale = np.abs(states).max(axis=0)
@@ -168,15 +160,15 @@ def test_one_move_finds_loads_that_answer_linearly():
             image[c, :, 2:] = state[:, c, 2:] * work.levers[:, c]
         return offset + image.ravel()
 
-    assert plain(find_joint_system)(tables, 0, level, MASK, work)
+    assert interpreted(find_joint_system)(tables, 0, level, MASK, work)
     start = generator.normal(size=offset.size)
     work.point[LOADS, : start.size] = start
     work.point[MISSED, : start.size] = answered(start) - start
-    plain(move_jointly)(tables, 0, level, MASK, work)
+    interpreted(move_jointly)(tables, 0, level, MASK, work)
     loads = work.point[LOADS, : start.size]
     assert np.abs(work.point[MOVE]).max() > 1.0
     assert answered(loads) == pytest.approx(loads, rel=1e-8, abs=1e-8)
 
 
 def test_a_set_of_all_pairs_has_every_pair():
-    assert all(plain(is_closed)(ALL, i) for i in (0, 5, 31))
+    assert all(interpreted(is_closed)(ALL, i) for i in (0, 5, 31))

@@ -4,9 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from calling import interpreted
 from scipy.optimize import brentq
 
-from rubhpc.kernels._jit import plain
 from rubhpc.kernels.curved_contact import N_NODE
 from rubhpc.kernels.curved_loads import LOADS, MISSED
 from rubhpc.kernels.curved_newton import factorise, fill_slopes, find_system, move_by_newton, solve
@@ -88,7 +88,7 @@ def test_slopes_are_those_of_the_equations(n_bending):
         accel=pair.accel.reshape(1, 1, d, 1),
         accel_rate=pair.accel_rate.reshape(1, 1, d, 1),
     )
-    plain(fill_slopes)(pairs, tables, 0, 1, work)
+    interpreted(fill_slopes)(pairs, tables, 0, 1, work)
     for j, step in enumerate(1e-5 * size):
         beside = [answer(pair, read + sign * step * np.eye(size.size)[j], d)[0] for sign in (1, -1)]
         expected = (beside[0] - beside[1]) / (2.0 * step)
@@ -126,10 +126,10 @@ def test_one_move_finds_loads_that_answer_linearly():
     def answered(x):
         return offset + loads @ (states @ x)
 
-    assert plain(find_system)(SimpleNamespace(reached=reached[None, None]), 0, 0, work)
+    assert interpreted(find_system)(SimpleNamespace(reached=reached[None, None]), 0, 0, work)
     start = generator.normal(size=n)
     work.point[LOADS], work.point[MISSED] = start, answered(start) - start
-    plain(move_by_newton)(work)
+    interpreted(move_by_newton)(work)
     assert np.abs(work.point[MISSED]).max() > 1.0
     assert answered(work.point[LOADS]) == pytest.approx(work.point[LOADS], rel=1e-9, abs=1e-9)
 
@@ -140,7 +140,7 @@ def test_systems_are_solved_with_rows_exchanged():
     matrix[0, 0] = 0.0
     factors, order, value = matrix.copy(), np.zeros(12, dtype=np.int64), generator.normal(size=12)
     expected = np.linalg.solve(matrix, value)
-    assert plain(factorise)(factors, order)
-    plain(solve)(factors, order, value)
+    assert interpreted(factorise)(factors, order)
+    interpreted(solve)(factors, order, value)
     assert value == pytest.approx(expected, rel=1e-10)
-    assert not plain(factorise)(np.zeros((12, 12)), order)
+    assert not interpreted(factorise)(np.zeros((12, 12)), order)

@@ -2,8 +2,12 @@
 
 import numpy as np
 import pytest
+from calling import called
 
 from rubhpc.kernels.curved_search import first_root, next_root
+
+first_root = called(first_root)
+next_root = called(next_root)
 
 
 def falling(*roots):

@@ -5,10 +5,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from calling import called
 
 from rubhpc.integrate.measuring.samples import following_accumulator, new_accumulator
 from rubhpc.kernels.accumulators import Accumulator
 from rubhpc.kernels.force_average import AVERAGING_TIME, LOUD, MOST_PIECES, add_force
+
+add_force = called(add_force)
 
 
 def add(pieces, accumulator: Accumulator | None = None, i=0):

@@ -2,8 +2,11 @@
 
 import numpy as np
 import pytest
+from calling import called
 
 from rubhpc.kernels.cubics import turning_value
+
+turning_value = called(turning_value)
 
 
 @pytest.mark.parametrize("seed", range(20))

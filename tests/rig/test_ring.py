@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from calling import called
 
 import rubhpc
 from rubhpc import InputError, Rig, assemble, read_rig
@@ -15,6 +16,8 @@ from rubhpc.kernels.complementarity import UNSOLVED, solve_complementarity
 from rubhpc.rig.reading import rig_from_dict, with_keys
 from rubhpc.rig.stators import MOST_STATORS
 from rubhpc.study.study import make_axis
+
+solve_complementarity = called(solve_complementarity)
 
 PACKAGED = read_rig("mokhtar2017")
 PACKAGED_FILE = Path(rubhpc.__file__).parent / "rigs" / "mokhtar2017.toml"

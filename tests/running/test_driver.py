@@ -16,7 +16,7 @@ from running import array_of, journalled_cases, write_sample, write_study
 from stub_physics import Physics, record
 
 from rubhpc.errors import InputError, RubError, StoppedEarly, StoreError
-from rubhpc.kernels._jit import compilation
+from rubhpc.integrate.compilation import compilation
 from rubhpc.running import case_setup, computing, job, stopping, worker
 from rubhpc.running.driver import run
 from rubhpc.running.pool import Alone
@@ -383,7 +383,7 @@ def test_a_second_interrupt_does_not_wait(physics, study):
 def test_compilations_are_announced_and_are_no_time_of_the_run(physics, study, monkeypatch, capsys):
     def compile_slowly(*_: Any) -> None:
         began = time.perf_counter()
-        compilation.began("advance")
+        compilation.announce_set_of("advance")
         time.sleep(0.5)
         compilation.seconds += time.perf_counter() - began
 
@@ -399,7 +399,7 @@ def test_compilations_are_announced_and_are_no_time_of_the_run(physics, study, m
 
 
 def test_the_first_rank_alone_announces_compilations(physics, study, monkeypatch, capsys):
-    monkeypatch.setattr(job, "_warm_up", lambda *_: compilation.began("advance"))
+    monkeypatch.setattr(job, "_warm_up", lambda *_: compilation.announce_set_of("advance"))
     monkeypatch.setattr("rubhpc.integrate.compilation._announced", [])
     monkeypatch.setattr(Alone, "rank", 1)
     run(study)

@@ -162,9 +162,9 @@ class _TooLong(BaseException):
 
 
 def _interrupt(*_: object) -> None:
-    from rubhpc.kernels._jit import compilation
+    from rubhpc.integrate.compilation import is_compiling
 
-    if compilation._depth > 0:
+    if is_compiling():
         signal.alarm(LONGEST)
     else:
         raise _TooLong
@@ -207,9 +207,9 @@ def see_that_indices_are_checked() -> None:
     """Read beyond an array in a kernel: above its end, and below its beginning."""
     import numpy as np
 
-    from rubhpc.kernels._jit import jit_lean_sum
+    from rubhpc.kernels._jit import jit_sum
 
-    @jit_lean_sum
+    @jit_sum
     def read(values, index):  # type: ignore[no-untyped-def]
         return values[index]
 

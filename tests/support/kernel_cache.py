@@ -12,17 +12,16 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 KERNELS = ROOT / "rubhpc" / "kernels"
 CACHES = ROOT / ".pytest_cache" / "kernels"
-SCHEMES = (  # of two processes, which take as long; those that share most are compiled by one
-    (
-        "events",
-        "neighbours",
-        "periodic",
-        "stick and slip",
-        "periodic stick and slip",
-        "run-up",
-        "short steps",
-    ),
-    ("curved gaps", "central differences"),
+SCHEMES = (
+    "events",
+    "neighbours",
+    "periodic",
+    "stick and slip",
+    "periodic stick and slip",
+    "run-up",
+    "short steps",
+    "curved gaps",
+    "central differences",
 )
 
 
@@ -33,12 +32,8 @@ def compile_once() -> None:
         return
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     environment.pop("NUMBA_CACHE_DIR", None)
-    compiling = [
-        subprocess.Popen([sys.executable, __file__, *schemes], env=environment, cwd=ROOT)
-        for schemes in SCHEMES
-    ]
-    codes = [process.wait() for process in compiling]
-    if any(codes):
+    command = [sys.executable, __file__, *SCHEMES]
+    if subprocess.run(command, env=environment, cwd=ROOT, check=False).returncode:
         raise SystemExit("the kernels could not be compiled")
     _mark(stamp)
 
@@ -95,11 +90,8 @@ def use_own_cache(worker: str) -> None:
 
 
 def _copy_to(folder: Path) -> None:
-    """Copy the cache to where numba looks for it below NUMBA_CACHE_DIR."""
-    from numba.core.caching import _CacheLocator
-
-    there = folder / _CacheLocator.get_suitable_cache_subpath(str(KERNELS / "__init__.py"))
-    shutil.copytree(KERNELS / "__pycache__", there, ignore=shutil.ignore_patterns("*.pyc"))
+    """Copy the cache to where the kernels of a worker look for it."""
+    shutil.copytree(KERNELS / "__pycache__", folder, ignore=shutil.ignore_patterns("*.pyc"))
 
 
 def _sources() -> str:

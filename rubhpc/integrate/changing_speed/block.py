@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rubhpc.integrate.changing_speed.piece_setup import with_values
-from rubhpc.kernels.case_progress import Clock
 
 if TYPE_CHECKING:
     import numpy as np
@@ -69,7 +68,6 @@ class Block:
         spin, tick = float(speeds.spin[place]), float(speeds.tick[place])
         search, growth = int(self.search_level[place]), float(speeds.growth[place])
         at_place = held.at_place(float(speeds.within[place]))
-        steady = template.clock
         return with_values(
             template,
             model=self.model,
@@ -77,7 +75,7 @@ class Block:
             spin=spin,
             interval=float(self.interval[place]),
             tick=tick,
-            clock=Clock(spin, tick, *steady[2:4], search, *steady[5:7], growth),
+            clock=template.clock._replace(spin=spin, tick=tick, search_level=search, growth=growth),
             speeds=speeds,
             place=place,
             _open_tables={},  # which are of this speed alone

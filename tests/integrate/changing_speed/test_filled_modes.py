@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from calling import called
 from trial_rig import trial_rig
 
 from rubhpc.case_arguments import case_of, read_probes
@@ -28,6 +29,10 @@ from rubhpc.kernels.contact_modes import enter
 from rubhpc.kernels.curved_levels import fill_level
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, lifted_place
 from rubhpc.kernels.measuring import energies_gained
+
+energies_gained = called(energies_gained)
+enter = called(enter)
+fill_level = called(fill_level)
 
 
 def setup(q):

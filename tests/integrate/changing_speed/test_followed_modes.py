@@ -4,11 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from calling import called
 from test_filled_modes import LAWS, setup
 
 from rubhpc.integrate.changing_speed.mode_courses import NODES
 from rubhpc.integrate.changing_speed.mode_parts import speeds_of
 from rubhpc.kernels.contact_modes import enter, enter_rest
+
+enter = called(enter)
+enter_rest = called(enter_rest)
+
+enter = called(enter)
+enter_rest = called(enter_rest)
 
 REACH = 20.0  # rad/s
 

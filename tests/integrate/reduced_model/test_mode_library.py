@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from calling import called
 from scipy.linalg import expm
 from trial_rig import trial_rig
 
@@ -30,6 +31,12 @@ from rubhpc.kernels.contact_modes import (
 from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.measuring import energies_gained
 from rubhpc.study.study import Contact, Integrator
+
+energies_gained = called(energies_gained)
+enter = called(enter)
+event_free_interval = called(event_free_interval)
+find_mode = called(find_mode)
+floor_log2 = called(floor_log2)
 
 CLEARANCE = np.array([80e-6, 95e-6])
 FRICTION = 0.3
