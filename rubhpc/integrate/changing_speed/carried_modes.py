@@ -61,7 +61,7 @@ def carried(before: Ended, jump: float, march: EventDrivenMarch, setup: PieceSet
     entered = modes.enter @ (known.motion[:, fast] @ (z[0, fast] + 1j * z[1, fast])).real
     if jump:
         entered = entered + _rung(modes, before, jump, setup)
-    found = np.zeros_like(z)
+    found = np.zeros((2, next_.width))
     found[:, : entered.size] = entered.real, entered.imag
     return found
 
