@@ -17,7 +17,7 @@ import numba
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
-TRIED = ("0.61.", "0.62.", "0.63.", "0.64.", "0.65.", "0.66.", "0.67.", "0.68.")
+TRIED = ("0.68.",)
 IS_PLAIN = os.environ.get("RUBHPC_PLAIN_NUMBA", "0") not in ("", "0") or not numba.__version__.startswith(
     TRIED
 )

@@ -98,7 +98,11 @@ def advance_friction_pieces(
             turn_unbalance(reduced, bodies)
             states = first_states(reduced, bodies, begun, pieces.pressing[piece])
             moment, before = (1 << FORCED_LEVEL) * now.tick, row_of(sums, piece * n_part)
-            states = change_states(reduced, bodies, states, 0, moment, 1.0, 0.0, begun, False, work, before)
+            none, no = (
+                int(np.int64(0)),
+                bool(np.bool_(False)),
+            )  # no literals, for which it would be compiled again
+            states = change_states(reduced, bodies, states, none, moment, 1.0, 0.0, begun, no, work, before)
             if states < 0:
                 return CONTACT_UNSOLVED
             progress.wanted, at[STAGE] = states, TO_ENTER

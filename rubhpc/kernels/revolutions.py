@@ -188,7 +188,7 @@ def follow_revolutions(
                     np.cos(angle),
                     np.sin(angle),
                     after,
-                    False,
+                    bool(np.bool_(False)),  # no literal, for which it would be compiled again
                     force,
                     given[0],
                     speed,

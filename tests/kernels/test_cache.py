@@ -15,12 +15,12 @@ from running import ROOT, environment
 from rubhpc.kernels import _cache
 
 LOAD = """
-import numba
 import rubhpc.kernels.laws
+from rubhpc.kernels._cache import cache_folder
 from rubhpc.integrate.compilation import compilation
-print(numba.config.CACHE_DIR)
+print(cache_folder())
 for name in ("one", "other"):
-    compilation.began(name)
+    compilation.announce_set_of(name)
 """
 
 

@@ -9,7 +9,7 @@ from rubhpc import State, simulate
 from rubhpc.integrate import case
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
-from rubhpc.integrate.periodic_motions.saltation import by_clearance
+from rubhpc.integrate.periodic_motions.saltation import monodromy
 from rubhpc.integrate.scheme import Scheme
 from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, state_of
@@ -70,25 +70,22 @@ def test_central_difference_is_the_same_motion(whipping):
     assert largest_difference(exact, stepped) < 1e-3
 
 
-@pytest.mark.parametrize("law", [PENALTY | {"damping": 300.0}, {"friction_law": "coulomb"}])
-def test_derivative_by_the_clearance_is_that_of_the_flow(law):
-    """With pairs that begin to stick: what the rims drive is no matter of clearances."""
-    setup = prepare(
-        trial_rig(3), 120.0, contact=Contact(**law), integrator=Integrator(), samples_per_revolution=64
-    )
-    given = {"clearance": "20 um", "friction": 0.6, "transient": 0, "revolutions": 3} | law
-    start = simulate(trial_rig(3), speed=120.0, **given).final
-
-    def followed(clearance):
-        motion = PiecewiseMotion(setup, clearance, 0.6, start)
-        return motion, motion.revolve(motion.start, motion.states, share=0.3)
-
-    motion, revolution = followed(20e-6)
-    assert any(state_of(piece.states, i) == STUCK for piece in revolution.pieces for i in range(3))
-    above, below = (followed(20e-6 + change)[1].end for change in (1e-10, -1e-10))
-    difference = (above - below) / 2e-10
-    derivative = by_clearance(motion, [revolution])
-    assert motion.size(difference - derivative) < 1e-6 * motion.size(difference)
+def test_monodromy_is_the_derivative_of_the_flow(whipping):
+    contact = Contact(**PENALTY, damping=300.0)
+    setup = prepare(trial_rig(3), 120.0, contact=contact, integrator=Integrator(), samples_per_revolution=64)
+    motion = PiecewiseMotion(setup, 20e-6, 0.6, whipping)
+    revolution = motion.revolve(motion.start, motion.states, share=0.3)
+    q = len(setup.model.stators)
+    assert any(state_of(piece.states, i) == STUCK for piece in revolution.pieces for i in range(q))
+    derivative = monodromy(motion, [revolution])
+    rng = np.random.default_rng(1)
+    for _ in range(3):
+        along = rng.standard_normal(motion.start.size)
+        along[: motion.n] /= setup.spin
+        step = 1e-8 * motion.size(motion.start) * along / motion.size(along)
+        ends = [motion.revolve(motion.start + sign * step, motion.states, share=0.3).end for sign in (1, -1)]
+        difference = 0.5 * (ends[0] - ends[1])
+        assert motion.size(difference - derivative @ step) < 1e-4 * motion.size(derivative @ step)
 
 
 def test_states_follow_from_gap_force_and_slip():
