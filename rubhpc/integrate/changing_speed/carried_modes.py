@@ -17,7 +17,7 @@ from rubhpc.integrate.changing_speed.range_library import RangeLibrary
 from rubhpc.kernels.pieces import FAST
 
 if TYPE_CHECKING:
-    from rubhpc.integrate.changing_speed.eigenmodes import Eigenmodes
+    from rubhpc.integrate.changing_speed.mode_courses import Eigenmodes
     from rubhpc.integrate.changing_speed.piece_setup import PieceSetup
     from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 

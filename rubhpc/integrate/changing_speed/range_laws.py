@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.changing_speed.eigenmodes import Eigenmodes
+    from rubhpc.integrate.changing_speed.mode_courses import Eigenmodes
     from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs
     from rubhpc.integrate.reduced_model.penalty_mode import Penalty
     from rubhpc.integrate.reduced_model.reduction import ReducedModel

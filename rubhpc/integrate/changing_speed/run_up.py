@@ -18,8 +18,7 @@ import numpy as np
 from rubhpc.fem.free_spin import unit_rotation
 from rubhpc.integrate.changing_speed.passing import Passing, state_at
 from rubhpc.integrate.changing_speed.pieces import Pieces
-from rubhpc.integrate.changing_speed.sample_times import bring_to_angles
-from rubhpc.integrate.changing_speed.turns import Turns
+from rubhpc.integrate.changing_speed.turns import Turns, bring_to_angles
 from rubhpc.integrate.changing_speed.twist_ramp import moved, sag_ramp
 from rubhpc.integrate.marches.modal import Place
 from rubhpc.integrate.measuring.samples import empty_samples, lift_samples, new_accumulator

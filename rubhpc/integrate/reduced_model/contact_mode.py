@@ -17,8 +17,8 @@ from rubhpc.integrate.reduced_model.system_modes import count_modes, modes_of, p
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rubhpc.integrate.reduced_model.closings import Within
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
+    from rubhpc.integrate.reduced_model.secular_modes import Within
     from rubhpc.integrate.reduced_model.system_modes import Solved
 
     Floats = NDArray[np.float64]

@@ -13,8 +13,8 @@ from rubhpc.integrate.reduced_model.secular_modes import Contact
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.reduced_model.closings import Within
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
+    from rubhpc.integrate.reduced_model.secular_modes import Within
     from rubhpc.integrate.reduced_model.system_modes import Solved
 
     Floats = NDArray[np.float64]

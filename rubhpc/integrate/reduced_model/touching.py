@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.integrate.reduced_model import reduction
-from rubhpc.integrate.reduced_model.closings import Closings, Within
 from rubhpc.integrate.reduced_model.contact_mode import solve_contact_mode
 from rubhpc.integrate.reduced_model.coupling import coupled_rows
 from rubhpc.integrate.reduced_model.energy_forms import (
@@ -29,7 +28,7 @@ from rubhpc.integrate.reduced_model.friction_mode import (
 )
 from rubhpc.integrate.reduced_model.penalty_mode import pressed_mode, solve_penalty_mode, watched
 from rubhpc.integrate.reduced_model.products import real_times
-from rubhpc.integrate.reduced_model.secular_modes import Eigenmodes
+from rubhpc.integrate.reduced_model.secular_modes import Closings, Eigenmodes, Within
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -8,10 +8,9 @@ from calling import called
 from trial_rig import trial_rig
 
 from rubhpc.case_arguments import case_of, read_probes
-from rubhpc.integrate.changing_speed.mode_parts import speeds_of
 from rubhpc.integrate.changing_speed.range_curved import RangeCurvedLibrary
 from rubhpc.integrate.changing_speed.range_laws import RangeFrictionLibrary, RangePenaltyLibrary
-from rubhpc.integrate.changing_speed.range_library import RangeLibrary
+from rubhpc.integrate.changing_speed.range_library import RangeLibrary, speeds_of
 from rubhpc.integrate.reduced_model.contact_mode import solve_contact_mode
 from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
 from rubhpc.integrate.reduced_model.energy_forms import energies_of

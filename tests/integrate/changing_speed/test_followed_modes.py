@@ -8,7 +8,7 @@ from calling import called
 from test_filled_modes import LAWS, setup
 
 from rubhpc.integrate.changing_speed.mode_courses import NODES
-from rubhpc.integrate.changing_speed.mode_parts import speeds_of
+from rubhpc.integrate.changing_speed.range_library import speeds_of
 from rubhpc.kernels.contact_modes import enter, enter_rest
 
 enter = called(enter)
