@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from copy import copy
+from dataclasses import replace
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
@@ -24,8 +25,8 @@ from rubhpc.integrate.changing_speed.mode_courses import (
     matched,
 )
 from rubhpc.integrate.reduced_model.energy_forms import energies_of
+from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary, width_without_modes
-from rubhpc.integrate.reduced_model.reduction import directions
 from rubhpc.integrate.reduced_model.table_stack import TableStack
 from rubhpc.integrate.reduced_model.touching import OpenBodies, open_bodies
 from rubhpc.kernels.contact_modes import LANES, SAMPLES_AT_ONCE
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from rubhpc.fem.model import Model
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode
     from rubhpc.integrate.reduced_model.energy_forms import Energies
+    from rubhpc.integrate.reduced_model.penalty_mode import SlidingPairs
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
     from rubhpc.integrate.reduced_model.system_modes import Solved
     from rubhpc.kernels.contact_modes import ModeTables
@@ -168,6 +170,7 @@ class RangeLibrary(ModeLibrary):
         model: Model,
         friction: float,
         *,
+        pairs: SlidingPairs | FrictionPairs | None = None,
         phasor: Complexes,
         known: Solved,
         tick: float,
@@ -184,7 +187,7 @@ class RangeLibrary(ModeLibrary):
         self.reduced, self._known, self._reach = _struck(reduced, phasor), known, reach
         self._spin = reduced.spin
         self._is_measured, self._at_place, self._at_once = is_balanced, at_place, at_once
-        self.gap_jacobian, self.force_direction, self.slip = directions(reduced, model, friction)
+        self._take_pairs(model, friction, pairs)
         self._tick, self._sample_level, self._n_level = tick, sample_level, n_level
         self._phasor, self._output = phasor, np.hstack(output_operators(reduced))
         self._among: OpenBodies | None = None
@@ -198,7 +201,7 @@ class RangeLibrary(ModeLibrary):
         self._held: dict[int, tuple[ModeTables, ModeCourse]] = {}  # by the set of closed pairs
         self._strange: set[int] = set()  # modes that cannot be followed
         self._counted: tuple[tuple[int, ...], int] = (), 0  # modes, and their memory, bytes
-        kind: tuple[object, ...] = type(self), self.width, n_level, is_balanced
+        kind: tuple[object, ...] = type(self), type(pairs), self.width, n_level, is_balanced
         buffer = TableBuffer(TableStack(1 + len(self.gap_jacobian), self._most_modes))
         self._buffer = buffer if buffers is None else buffers.setdefault(kind, buffer)
         self._tables = self._buffer.tables
@@ -302,8 +305,10 @@ class RangeLibrary(ModeLibrary):
     def eigenmodes(self, mask: int, within: float) -> Eigenmodes | None:
         """Those of a set of closed pairs at a place in the range, from -1 to 1.
 
-        None where a speed changes what enters them otherwise, or it has no room.
+        None where a speed changes what enters them otherwise, as that of rims does, or it has no room.
         """
+        if isinstance(self._pairs, FrictionPairs) and self._pairs.closed(mask):
+            return None
         if mask not in self._held and self.is_full:
             self.forget()
         if not self._has(mask) or mask in self._strange:
@@ -387,34 +392,37 @@ class RangeLibrary(ModeLibrary):
     def _node(self, mode: ContactMode) -> Node:
         """A mode of these matrices, with its tables."""
         row = self._tables_of(mode, self.reduced)
-        n = self.slip.shape[1]
+        n = self.gap_jacobian.shape[1]
         shape, rate = mode.motion[:n], mode.motion[n:]
         resisting = np.zeros((0, mode.exponent.size), dtype=np.complex128)
         if self._is_measured:
-            reduced, friction = self._damped(mode.mask), self._friction_of(mode)
+            reduced, friction = self._pairs.damped(self.reduced, mode.mask), self._friction_of(mode)
             skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
             resisting = reduced.damping @ rate + skew @ shape
             if friction is not None:
                 resisting = resisting - friction
         else:
-            row = with_slip(row, self._slip_rows() @ rate, mode.exponent)
+            row = with_slip(row, self.slip @ rate, mode.exponent)
         return Node.of(mode, row, self._output, resisting)
 
     def _constant(self, node: Node) -> ModeCourse:
         """A mode that stays what it is."""
         mask = node.mode.mask
-        spring, pressed = self._springs(mask) if self._is_measured else (0.0, [])
+        closed, spring = self._pairs.closed(mask), self._pairs.stiffness if self._is_measured else 0.0
+        pressed = closed if spring else []
         return constant_course(
             node,
             self._phasor,
-            n_ahead=1 if self._closed_pairs(mask) else SAMPLES_AT_ONCE,
+            n_ahead=1 if closed else SAMPLES_AT_ONCE,
             spring=spring,
             gap=self.gap_jacobian[pressed],
             clearance=pressed,
         )
 
     def _others(self, beside: Sequence[ReducedModel]) -> list[tuple[ReducedModel, float]]:
-        """Matrices beside those in the middle, and their places in the range."""
+        """Matrices beside those in the middle, or the same with rims at other speeds; places in the range."""
+        if isinstance(self._pairs, FrictionPairs) and not beside:
+            beside = [self.reduced] * (len(NODES) - 1)
         return list(zip(beside, NODES[1:], strict=False))
 
     def _with(self, reduced: ReducedModel, place: float = 0.0) -> Self:
@@ -422,6 +430,9 @@ class RangeLibrary(ModeLibrary):
         other = copy(self)
         other.reduced, other._output = _struck(reduced, self._phasor), np.hstack(output_operators(reduced))
         other._beside, other._is_open = [], False
+        if isinstance(self._pairs, FrictionPairs):  # the speed of the rims goes with that of the shaft
+            share = 1.0 + place * self._reach / self._spin
+            other._pairs = replace(self._pairs, rim_speed=self._pairs.rim_speed * share)
         return other
 
     def _solved(self, mask: int) -> ContactMode:
@@ -432,7 +443,9 @@ class RangeLibrary(ModeLibrary):
 
     def _energies_of(self, mode: ContactMode) -> Energies:
         """Energies of a mode, whose order is not that of open bodies."""
-        found = energies_of(mode, self._damped(mode.mask), self._friction_of(mode), self.width)
+        found = energies_of(
+            mode, self._pairs.damped(self.reduced, mode.mask), self._friction_of(mode), self.width
+        )
         return self._with_springs(found, mode)
 
     def _spared(self, mode: ContactMode) -> None:
@@ -440,6 +453,8 @@ class RangeLibrary(ModeLibrary):
 
     def _width_of(self, model: Model, friction: float) -> int:
         """Width of tables for any mode that is met later."""
+        if isinstance(self._pairs, FrictionPairs):
+            return self._width([self._opened.exponent.size])
         return width_without_modes(self.reduced, model, friction, self._opened.exponent.size)
 
 

@@ -72,20 +72,6 @@ class FrictionMode(ContactMode):
         growth[columns] = self.growth
         return {"n_mode": m, "growth": growth}
 
-    def friction_forces(self, pairs: FrictionPairs) -> Complexes:
-        """Friction forces on the motion with each coordinate, (n, m + 2 + 2 q), N."""
-        closed = pairs.closed(self.mask)
-        traction = np.zeros((len(closed), self.exponent.size), dtype=np.complex128)
-        states = states_of(self.mask, len(pairs.gap_jacobian))
-        for along, i in zip(traction, closed, strict=True):
-            first, second = self.switch[2 * i], self.switch[2 * i + 1]
-            if states[i] == STUCK:
-                along[:] = 0.5 * (second - first)
-            else:
-                along[:] = (-pairs.friction if states[i] == BACKWARD else pairs.friction) * first
-        forces: Complexes = pairs.friction_direction[closed].T @ traction
-        return forces
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FrictionPairs:
@@ -105,7 +91,23 @@ class FrictionPairs:
 
     def damped(self, reduced: ReducedModel, mask: int) -> ReducedModel:
         """The model with the penalty's dampers of the closed pairs."""
-        return damped(reduced, self.damping, self.gap_jacobian[self.closed(mask)])
+        return (
+            damped(reduced, self.damping, self.gap_jacobian[self.closed(mask)]) if self.stiffness else reduced
+        )
+
+    def friction_forces(self, mode: ContactMode) -> Complexes:
+        """Friction forces on the motion with each coordinate of a mode, (n, m + 2 + 2 q), N."""
+        closed = self.closed(mode.mask)
+        traction = np.zeros((len(closed), mode.exponent.size), dtype=np.complex128)
+        states = states_of(mode.mask, len(self.gap_jacobian))
+        for along, i in zip(traction, closed, strict=True):
+            first, second = mode.switch[2 * i], mode.switch[2 * i + 1]
+            if states[i] == STUCK:
+                along[:] = 0.5 * (second - first)
+            else:
+                along[:] = (-self.friction if states[i] == BACKWARD else self.friction) * first
+        forces: Complexes = self.friction_direction[closed].T @ traction
+        return forces
 
 
 def states_of(mask: int, q: int) -> list[int]:

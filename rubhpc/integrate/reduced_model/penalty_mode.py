@@ -18,33 +18,41 @@ if TYPE_CHECKING:
     from rubhpc.integrate.reduced_model.system_modes import Solved
 
     Floats = NDArray[np.float64]
+    Complexes = NDArray[np.complex128]
 
 
-class Penalty(NamedTuple):
-    """The q pairs of a penalty, in reduced coordinates."""
+class SlidingPairs(NamedTuple):
+    """The q pairs of steady sliding, in reduced coordinates."""
 
-    stiffness: float  # N/m
-    damping: float  # N s/m
     gap_jacobian: Floats  # (q, n)
     force_direction: Floats  # (q, n), force of a unit contact force, friction included
+    stiffness: float = 0.0  # N/m, of a penalty; 0: closed gaps are constraints
+    damping: float = 0.0  # N s/m, of a penalty
 
-    def pressed(self, mask: int) -> list[int]:
-        """Pressed pairs of a set of states."""
+    def closed(self, mask: int) -> list[int]:
+        """Closed pairs of a set of states; under a penalty those that are pressed."""
         return [i for i in range(len(self.gap_jacobian)) if mask >> i & 1]
 
     def lifted(self, mask: int) -> list[int]:
         """Lifted pairs: their gap still overlaps, but the damper has ended their force."""
-        q = len(self.gap_jacobian)
-        return [i for i in range(q) if mask >> q + i & 1]
+        return self.closed(mask >> len(self.gap_jacobian))
 
     def damped(self, reduced: ReducedModel, mask: int) -> ReducedModel:
-        """The model with the dampers of the pressed pairs, without the friction by their forces."""
-        return damped(reduced, self.damping, self.gap_jacobian[self.pressed(mask)])
+        """The model with the penalty's dampers of the closed pairs, without the friction by their forces."""
+        return (
+            damped(reduced, self.damping, self.gap_jacobian[self.closed(mask)]) if self.stiffness else reduced
+        )
+
+    def friction_forces(self, mode: ContactMode) -> Complexes:
+        """Friction forces on the motion with each coordinate of a mode, (n, m + 1 + q), N."""
+        closed = self.closed(mode.mask)
+        friction: Complexes = (self.force_direction - self.gap_jacobian)[closed].T @ mode.switch[closed]
+        return friction
 
 
 def solve_penalty_mode(
     reduced: ReducedModel,
-    penalty: Penalty,
+    penalty: SlidingPairs,
     opened: ContactMode,
     mask: int,
     known: Solved | None = None,
@@ -54,18 +62,18 @@ def solve_penalty_mode(
 
     `opened` is the mode with every pair open, `bodies` are the bodies in that mode.
     """
-    pressed = penalty.pressed(mask)
+    pressed = penalty.closed(mask)
     mode = pressed_mode(reduced, penalty, pressed, known, bodies) if pressed else opened
     return watched(mode, penalty, mask)
 
 
-def watched(mode: ContactMode, penalty: Penalty, mask: int) -> ContactMode:
+def watched(mode: ContactMode, penalty: SlidingPairs, mask: int) -> ContactMode:
     """The motion of a mode with the switch functions of a set of states.
 
     That of a pressed pair is its force, of an open one its gap, of a lifted one the tension that its spring
     and damper would have.
     """
-    pressed, lifted, (q, n) = penalty.pressed(mask), penalty.lifted(mask), penalty.gap_jacobian.shape
+    pressed, lifted, (q, n) = penalty.closed(mask), penalty.lifted(mask), penalty.gap_jacobian.shape
     clear = np.hstack([np.zeros((q, mode.exponent.size - q)), np.eye(q)])
     switch = penalty.gap_jacobian @ mode.motion[:n] + clear
     tension = penalty.stiffness * switch + penalty.damping * (penalty.gap_jacobian @ mode.motion[n:])
@@ -75,7 +83,7 @@ def watched(mode: ContactMode, penalty: Penalty, mask: int) -> ContactMode:
 
 def pressed_mode(
     reduced: ReducedModel,
-    penalty: Penalty,
+    penalty: SlidingPairs,
     pressed: list[int],
     known: Solved | None,
     opened: Within | None = None,

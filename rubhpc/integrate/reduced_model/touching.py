@@ -21,6 +21,7 @@ from rubhpc.integrate.reduced_model.energy_forms import (
 )
 from rubhpc.integrate.reduced_model.friction_mode import (
     FrictionMode,
+    FrictionPairs,
     mask_of,
     solve_friction_mode,
     states_of,
@@ -35,8 +36,7 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.model import Model
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode
-    from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs
-    from rubhpc.integrate.reduced_model.penalty_mode import Penalty
+    from rubhpc.integrate.reduced_model.penalty_mode import SlidingPairs
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
     from rubhpc.integrate.reduced_model.system_modes import Solved
 
@@ -236,13 +236,13 @@ def contact_mode_among(
 def penalty_mode_among(
     among: OpenBodies | None,
     reduced: ReducedModel,
-    penalty: Penalty,
+    penalty: SlidingPairs,
     opened: ContactMode,
     mask: int,
     known: Solved | None,
 ) -> ContactMode:
     """The contact mode of `solve_penalty_mode`."""
-    pressed, (q, n) = penalty.pressed(mask), penalty.gap_jacobian.shape
+    pressed, (q, n) = penalty.closed(mask), penalty.gap_jacobian.shape
     touching = among.touching(pressed) if among and pressed else None
     if among is None or touching is None:
         return solve_penalty_mode(reduced, penalty, opened, mask, known, among.within() if among else None)
@@ -275,6 +275,22 @@ def friction_mode_among(
     mode = replace(touching.among_all(own, among.opened, n, q), mask=mask)
     watch_open_pairs(mode.switch, mode.motion, pairs, mask, mode.n_mode)
     return mode
+
+
+def mode_among(
+    among: OpenBodies | None,
+    reduced: ReducedModel,
+    pairs: SlidingPairs | FrictionPairs,
+    opened: ContactMode | None,
+    mask: int,
+    known: Solved | None,
+) -> ContactMode:
+    """The contact mode of a set of states; `opened` is that with every pair open, if it is known."""
+    if isinstance(pairs, FrictionPairs):
+        return friction_mode_among(among, reduced, pairs, mask, known)
+    if pairs.stiffness and opened is not None:
+        return penalty_mode_among(among, reduced, pairs, opened, mask, known)
+    return contact_mode_among(among, reduced, (pairs.gap_jacobian, pairs.force_direction), mask, known)
 
 
 def open_bodies(reduced: ReducedModel, model: Model, opened: ContactMode) -> OpenBodies | None:

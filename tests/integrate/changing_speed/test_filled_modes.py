@@ -1,6 +1,7 @@
 """Tables filled for a speed are those made again for it."""
 
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -9,14 +10,13 @@ from trial_rig import trial_rig
 
 from rubhpc.case_arguments import case_of, read_probes
 from rubhpc.integrate.changing_speed.range_curved import RangeCurvedLibrary
-from rubhpc.integrate.changing_speed.range_laws import RangeFrictionLibrary, RangePenaltyLibrary
 from rubhpc.integrate.changing_speed.range_library import RangeLibrary, speeds_of
 from rubhpc.integrate.reduced_model.contact_mode import solve_contact_mode
 from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
 from rubhpc.integrate.reduced_model.energy_forms import energies_of
 from rubhpc.integrate.reduced_model.friction_mode import mask_of, solve_friction_mode
 from rubhpc.integrate.reduced_model.mode_tables import tabulate
-from rubhpc.integrate.reduced_model.penalty_mode import Penalty, stored_energy
+from rubhpc.integrate.reduced_model.penalty_mode import SlidingPairs, stored_energy
 from rubhpc.integrate.reduced_model.reduction import directions
 from rubhpc.integrate.reduced_model.touching import (
     contact_mode_among,
@@ -52,7 +52,7 @@ def measured(mode, reduced, slip, friction, *, width, **levels):
 class Sliding:
     """Gaps closed by multipliers, steady sliding."""
 
-    kind, masks = RangeLibrary, {1: (0, 1), 3: (0, 2, 5)}
+    masks = MappingProxyType({1: (0, 1), 3: (0, 2, 5)})
 
     def keys(self, base):
         return {}
@@ -76,7 +76,6 @@ STATES = {
 class Sticking:
     """Pairs that slide in either sense or stick."""
 
-    kind = RangeFrictionLibrary
     masks = STATES
 
     def pairs(self, base, spin):
@@ -90,33 +89,32 @@ class Sticking:
         pairs = self.pairs(base, reduced.spin)
         among = open_bodies(reduced, base.model, solve_friction_mode(reduced, pairs, 0))
         mode = friction_mode_among(among, reduced, pairs, mask, None)
-        return measured(mode, reduced, library.slip[:0], mode.friction_forces(pairs), **levels)
+        return measured(mode, reduced, library.slip[:0], pairs.friction_forces(mode), **levels)
 
 
 class Springs:
     """Pairs that press, by spring and damper, or are lifted."""
 
-    kind, masks = RangePenaltyLibrary, {1: (0, 1, 2), 3: (0, 0b001_101, 0b011)}
+    masks = MappingProxyType({1: (0, 1, 2), 3: (0, 0b001_101, 0b011)})
 
     def keys(self, base):
         gap, force, _ = directions(base.reduced, base.model, 0.2)
-        return {"penalty": Penalty(1e6, 50.0, gap, force)}
+        return {"pairs": SlidingPairs(gap, force, 1e6, 50.0)}
 
     def tables(self, library, reduced, base, mask, levels):
-        penalty = self.keys(base)["penalty"]
+        penalty = self.keys(base)["pairs"]
         opened = solve_contact_mode(reduced, library.gap_jacobian, library.force_direction, 0)
         among = open_bodies(reduced, base.model, opened)
         mode = penalty_mode_among(among, reduced, penalty, opened, mask, None)
         damped, friction = penalty.damped(reduced, mask), library._friction_of(mode)
         tables = measured(mode, damped, library.slip, friction, **levels)
-        tables.loss[0] += stored_energy(1e6, penalty.gap_jacobian, penalty.pressed(mask), mode, library.width)
+        tables.loss[0] += stored_energy(1e6, penalty.gap_jacobian, penalty.closed(mask), mode, library.width)
         return tables
 
 
 class StickingSprings(Sticking):
     """Friction with stick where springs and dampers press; the last bits are those of lifted pairs."""
 
-    kind = RangeFrictionLibrary
     masks = STATES | {1: (*STATES[1], 1 << lifted_place(1, 0))}
 
     def pairs(self, base, spin):
@@ -126,7 +124,7 @@ class StickingSprings(Sticking):
         pairs = self.pairs(base, reduced.spin)
         among = open_bodies(reduced, base.model, solve_friction_mode(reduced, pairs, 0))
         mode = friction_mode_among(among, reduced, pairs, mask, None)
-        damped, friction = pairs.damped(reduced, mask), mode.friction_forces(pairs)
+        damped, friction = pairs.damped(reduced, mask), pairs.friction_forces(mode)
         tables = measured(mode, damped, library.slip[:0], friction, **levels)
         tables.loss[0] += stored_energy(1e6, pairs.gap_jacobian, pairs.closed(mask), mode, library.width)
         return tables
@@ -141,7 +139,7 @@ def test_a_tuned_mode_is_the_mode_at_that_speed(q, law):
     base, masks = setup(q), law.masks[q]
     phasor = (base.reduced.force[0] - 1j * base.reduced.force[1]) / base.spin**2
     levels = {"sample_level": base.sample_level, "n_level": base._n_level}
-    library = law.kind(
+    library = RangeLibrary(
         base.reduced,
         base.model,
         0.2,
@@ -174,7 +172,7 @@ def test_a_tuned_mode_is_the_mode_at_that_speed(q, law):
         expected = law.tables(library, reduced, base, mask, levels)
         for name in expected._fields:
             values, anew = getattr(found, name)[place], getattr(expected, name)[0]
-            if name == "output" and library._closed_pairs(mask):  # only the first sample is read
+            if name == "output" and library._pairs.closed(mask):  # only the first sample is read
                 values, anew = values[:, : len(library._output)], anew[:, : len(library._output)]
             largest = np.abs(anew).max(initial=0.0)
             assert np.abs(values - anew).max(initial=0.0) <= 1e-9 * largest, name
@@ -187,7 +185,7 @@ def test_energy_balances_while_the_unbalance_force_grows(growth):
     phasor = (base.reduced.force[0] - 1j * base.reduced.force[1]) / base.spin**2
     factor = (spin**2 - 40.0j) * np.exp(0.7j)
     levels = {"sample_level": base.sample_level, "n_level": base._n_level}
-    library = law.kind(base.reduced, base.model, 0.2, phasor=phasor, known={}, tick=base.tick, **levels)
+    library = RangeLibrary(base.reduced, base.model, 0.2, phasor=phasor, known={}, tick=base.tick, **levels)
     library.tune(speeds_of([spin], [factor], [growth], [base.tick], base.spin, base.sample_level), 0)
     reduced, n, time = base.reduced, len(base.reduced.stiffness), 1e-3
     for mask in law.masks[3]:

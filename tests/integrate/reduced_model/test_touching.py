@@ -6,7 +6,7 @@ import pytest
 from rubhpc.integrate.reduced_model.contact_mode import solve_contact_mode
 from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs, mask_of, solve_friction_mode
 from rubhpc.integrate.reduced_model.mode_tables import Spared, tabulate
-from rubhpc.integrate.reduced_model.penalty_mode import Penalty
+from rubhpc.integrate.reduced_model.penalty_mode import SlidingPairs
 from rubhpc.integrate.reduced_model.reduction import ReducedModel
 from rubhpc.integrate.reduced_model.touching import (
     OpenBodies,
@@ -78,11 +78,11 @@ def solved(bodies, law, states):
         opened = solve_friction_mode(reduced, pairs, 0)
         among, mask = OpenBodies(reduced, opened, seen), mask_of(states)
         modes = [friction_mode_among(bodies, reduced, pairs, mask, None) for bodies in (None, among)]
-        return modes, among, closed, reduced, [mode.friction_forces(pairs) for mode in modes]
+        return modes, among, closed, reduced, [pairs.friction_forces(mode) for mode in modes]
     opened = solve_contact_mode(reduced, *directions, 0)
     among = OpenBodies(reduced, opened, seen)
     if law == "penalty":
-        penalty = Penalty(3e5, 40.0, *directions)
+        penalty = SlidingPairs(*directions, 3e5, 40.0)
         modes = [penalty_mode_among(of, reduced, penalty, opened, mask, None) for of in (None, among)]
         reduced = penalty.damped(reduced, mask)
     else:
