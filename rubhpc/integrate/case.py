@@ -20,7 +20,6 @@ from rubhpc.integrate.compilation import (
     STICK,
     seconds_compiling,
 )
-from rubhpc.integrate.initial_state import fit_to_gaps, with_overlap
 from rubhpc.integrate.lyapunov import Growth, Marches
 from rubhpc.integrate.marched_record import Marched, march_record, repeat_period
 from rubhpc.integrate.marches.central_difference import CentralDifferenceMarch
@@ -49,7 +48,7 @@ from rubhpc.integrate.periodic_motions.proof import Solver
 from rubhpc.integrate.periodic_motions.solved_motion import SolvedMotion, solved_motions
 from rubhpc.integrate.record import Record, State
 from rubhpc.integrate.scheme import Scheme
-from rubhpc.integrate.start import start_of
+from rubhpc.integrate.start import fit_to_gaps, start_of, with_overlap
 from rubhpc.integrate.tangent_motion import TangentMotion
 from rubhpc.integrate.transient import pass_revolutions, pass_transient
 from rubhpc.kernels._jit import plain
@@ -113,8 +112,8 @@ def run_case(
     friction : float
         Coefficient of friction.
     initial : State or Initial, optional
-        Where to start, with the unbalance at its phase 0; default: at rest (`initial_state.at_rest`). The
-        final state of another case is fitted to the gaps of this one (`initial_state.fit_to_gaps`).
+        Where to start, with the unbalance at its phase 0; default: at rest (`start.at_rest`). The
+        final state of another case is fitted to the gaps of this one (`start.fit_to_gaps`).
     check : callable, optional
         Called between kernel calls, a quarter of a second apart at most; what it raises ends the case.
     say : callable

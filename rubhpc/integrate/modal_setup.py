@@ -13,18 +13,17 @@ import numpy as np
 from rubhpc.integrate.measuring.divergence import energy_limit
 from rubhpc.integrate.reduced_model.contact_mode import (
     ContactMode,
+    SlidingPairs,
     confine,
     solve_contact_mode,
 )
 from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
-from rubhpc.integrate.reduced_model.energy_forms import energies_of
 from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs, solve_friction_mode
 from rubhpc.integrate.reduced_model.mode_library import (
     ModeLibrary,
     width_without_modes,
 )
-from rubhpc.integrate.reduced_model.mode_tables import tabulate
-from rubhpc.integrate.reduced_model.penalty_mode import SlidingPairs
+from rubhpc.integrate.reduced_model.mode_tables import energies_of, tabulate
 from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions, kernel_bodies
 from rubhpc.integrate.reduced_model.system_modes import KeptParts, solve_parts
 from rubhpc.integrate.reduced_model.touching import OpenBodies, open_bodies

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.changing_speed.carried_modes import Ended
+    from rubhpc.integrate.changing_speed.passing import Ended
     from rubhpc.integrate.changing_speed.piece_setup import PieceSetup
     from rubhpc.integrate.marches.modal import Place
     from rubhpc.integrate.modal_setup import ModalSetup
@@ -277,7 +277,7 @@ def _is_uneven(rubbed: float, duration: float, length: int, per_revolution: int)
 
 
 class LastTurn:
-    """Braking over the last revolution, by the samples in it."""
+    """Braking over the last revolution, by the samples in it: rub recurs at the same angle."""
 
     def __init__(self, per_revolution: int) -> None:
         """Start without braking."""

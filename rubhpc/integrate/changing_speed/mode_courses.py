@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.integrate.reduced_model.energy_forms import growth_of
+from rubhpc.integrate.reduced_model.mode_tables import growth_of
 from rubhpc.kernels.courses import Course, Courses, take_course
 from rubhpc.kernels.filling import ModeCourse
 from rubhpc.kernels.filling_energies import Losses

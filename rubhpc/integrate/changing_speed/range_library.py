@@ -24,9 +24,9 @@ from rubhpc.integrate.changing_speed.mode_courses import (
     followed,
     matched,
 )
-from rubhpc.integrate.reduced_model.energy_forms import energies_of
 from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary, width_without_modes
+from rubhpc.integrate.reduced_model.mode_tables import energies_of
 from rubhpc.integrate.reduced_model.table_stack import TableStack
 from rubhpc.integrate.reduced_model.touching import OpenBodies, open_bodies
 from rubhpc.kernels.contact_modes import LANES, SAMPLES_AT_ONCE
@@ -39,9 +39,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.reduced_model.contact_mode import ContactMode
-    from rubhpc.integrate.reduced_model.energy_forms import Energies
-    from rubhpc.integrate.reduced_model.penalty_mode import SlidingPairs
+    from rubhpc.integrate.reduced_model.contact_mode import ContactMode, SlidingPairs
+    from rubhpc.integrate.reduced_model.mode_tables import Energies
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
     from rubhpc.integrate.reduced_model.system_modes import Solved
     from rubhpc.kernels.contact_modes import ModeTables

@@ -106,6 +106,9 @@ def contact_measures(
 def bring_to_angles(whole: Floats, swing: Floats, cuts: Ints, n_place: int) -> None:
     """Resample (`Samples.whole`) at the intended angles of the shaft, in place.
 
+    A piece is sampled at even times. At the acceleration a the shaft then lags the even angles by up to
+    `a T^2 / 8`, and reaches them later.
+
     Contact forces, which are means over the intervals, are not changed.
 
     Parameters

@@ -12,9 +12,9 @@ from rubhpc.integrate.reduced_model.contact_mode import (
     Places,
     confine,
     confined_modes,
+    damped,
     steady_response,
 )
-from rubhpc.integrate.reduced_model.penalty_mode import damped
 from rubhpc.integrate.reduced_model.products import expanded, real_times
 from rubhpc.integrate.reduced_model.secular_modes import Contact
 from rubhpc.kernels.friction_states import BACKWARD, OPEN, STUCK, lifted_place
@@ -134,7 +134,7 @@ def solve_friction_mode(
     equations on L, `L^T B = 0`, removes the forces. B are their directions: the normal force of a sliding
     pair includes its friction, that of a sticking pair does not. Under a penalty gaps are not constraints:
     `k P Q` and `c P Q` are added to the matrices, and `-k P` is the load of the clearances, as in
-    `penalty_mode`. `opened` are the bodies with every pair open.
+    `pressed_mode`. `opened` are the bodies with every pair open.
     """
     n, q = reduced.stiffness.shape[0], len(pairs.gap_jacobian)
     states = np.array(states_of(mask, q))

@@ -8,11 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rubhpc.integrate.reduced_model.contact_mode import ContactMode, count_coordinates
-from rubhpc.integrate.reduced_model.energy_forms import energies_of
+from rubhpc.integrate.reduced_model.contact_mode import (
+    ContactMode,
+    SlidingPairs,
+    count_coordinates,
+    stored_energy,
+)
 from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs
-from rubhpc.integrate.reduced_model.mode_tables import Spared, bytes_ahead, mode_of, tabulate
-from rubhpc.integrate.reduced_model.penalty_mode import SlidingPairs, stored_energy
+from rubhpc.integrate.reduced_model.mode_tables import Spared, bytes_ahead, energies_of, mode_of, tabulate
 from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions
 from rubhpc.integrate.reduced_model.table_stack import MOST_BYTES, MOST_MODES, TableStack
 from rubhpc.integrate.reduced_model.touching import mode_among, open_bodies
@@ -22,7 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.reduced_model.energy_forms import Energies
+    from rubhpc.integrate.reduced_model.mode_tables import Energies
     from rubhpc.integrate.reduced_model.system_modes import Solved
     from rubhpc.integrate.reduced_model.touching import OpenBodies
     from rubhpc.kernels import contact_modes as kernel

@@ -36,6 +36,10 @@ MOST_BYTES = 2**29  # of parts that are kept
 def separate(system: Floats) -> tuple[Complexes, Complexes, Complexes] | None:
     """Exponents, shapes and inverse shapes of a first-order system with repeated exponents.
 
+    Many identical stators on one carrier have such. A general eigensolver returns all eigenvectors of a
+    repeated exponent, but rounding determines their directions: two may nearly coincide. They are replaced by
+    an orthonormal basis of their span, in coordinates in which displacements and rates have equal size.
+
     Parameters
     ----------
     system : (n, n)

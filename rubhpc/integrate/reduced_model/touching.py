@@ -10,15 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.integrate.reduced_model import reduction
-from rubhpc.integrate.reduced_model.contact_mode import solve_contact_mode
-from rubhpc.integrate.reduced_model.coupling import coupled_rows
-from rubhpc.integrate.reduced_model.energy_forms import (
-    Energies,
-    Growth,
-    energies_of,
-    energy_forms,
-    growth_of,
+from rubhpc.integrate.reduced_model.contact_mode import (
+    pressed_mode,
+    solve_contact_mode,
+    solve_penalty_mode,
+    watched,
 )
+from rubhpc.integrate.reduced_model.coupling import coupled_rows
 from rubhpc.integrate.reduced_model.friction_mode import (
     FrictionMode,
     FrictionPairs,
@@ -27,7 +25,13 @@ from rubhpc.integrate.reduced_model.friction_mode import (
     states_of,
     watch_open_pairs,
 )
-from rubhpc.integrate.reduced_model.penalty_mode import pressed_mode, solve_penalty_mode, watched
+from rubhpc.integrate.reduced_model.mode_tables import (
+    Energies,
+    Growth,
+    energies_of,
+    energy_forms,
+    growth_of,
+)
 from rubhpc.integrate.reduced_model.products import real_times
 from rubhpc.integrate.reduced_model.secular_modes import Closings, Eigenmodes, Within
 
@@ -35,8 +39,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.reduced_model.contact_mode import ContactMode
-    from rubhpc.integrate.reduced_model.penalty_mode import SlidingPairs
+    from rubhpc.integrate.reduced_model.contact_mode import ContactMode, SlidingPairs
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
     from rubhpc.integrate.reduced_model.system_modes import Solved
 

@@ -11,12 +11,10 @@ from trial_rig import trial_rig
 from rubhpc.case_arguments import case_of, read_probes
 from rubhpc.integrate.changing_speed.range_curved import RangeCurvedLibrary
 from rubhpc.integrate.changing_speed.range_library import RangeLibrary, speeds_of
-from rubhpc.integrate.reduced_model.contact_mode import solve_contact_mode
+from rubhpc.integrate.reduced_model.contact_mode import SlidingPairs, solve_contact_mode, stored_energy
 from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
-from rubhpc.integrate.reduced_model.energy_forms import energies_of
 from rubhpc.integrate.reduced_model.friction_mode import mask_of, solve_friction_mode
-from rubhpc.integrate.reduced_model.mode_tables import tabulate
-from rubhpc.integrate.reduced_model.penalty_mode import SlidingPairs, stored_energy
+from rubhpc.integrate.reduced_model.mode_tables import energies_of, tabulate
 from rubhpc.integrate.reduced_model.reduction import directions
 from rubhpc.integrate.reduced_model.touching import (
     contact_mode_among,

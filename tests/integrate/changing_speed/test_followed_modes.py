@@ -8,7 +8,7 @@ from calling import called
 from test_filled_modes import LAWS, setup
 
 from rubhpc.integrate.changing_speed.mode_courses import NODES
-from rubhpc.integrate.changing_speed.range_library import speeds_of
+from rubhpc.integrate.changing_speed.range_library import RangeLibrary, speeds_of
 from rubhpc.kernels.contact_modes import enter, enter_rest
 
 enter = called(enter)
@@ -72,7 +72,7 @@ def assert_primitives(tables, row):
 
 def library_of(base, law, at):
     phasor = (base.reduced.force[0] - 1j * base.reduced.force[1]) / base.spin**2
-    return law.kind(
+    return RangeLibrary(
         at(0.0),
         base.model,
         0.2,

@@ -52,7 +52,7 @@ def test_memory_of_many_ranges_is_bounded(motion, budget, monkeypatch):
 def test_what_is_kept_of_a_set_up_goes_with_it():
     """Hundreds of megabytes of a machine, in a process that computes other ones after it."""
     run_up(replace(pump(), stator=TIPS), clearance=1e-4, friction=0.05, samples_per_revolution=64, **BENDS)
-    kept = pieces._KNOWN, pieces._RIPPLES, speed_ranges._DESKS
+    kept = pieces._KNOWN, pieces._RIPPLES, speed_ranges._BUFFERS
     assert all(kept)
     recent.forget()
     gc.collect()

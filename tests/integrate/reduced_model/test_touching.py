@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from rubhpc.integrate.reduced_model.contact_mode import solve_contact_mode
+from rubhpc.integrate.reduced_model.contact_mode import SlidingPairs, solve_contact_mode
 from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs, mask_of, solve_friction_mode
 from rubhpc.integrate.reduced_model.mode_tables import Spared, tabulate
-from rubhpc.integrate.reduced_model.penalty_mode import SlidingPairs
 from rubhpc.integrate.reduced_model.reduction import ReducedModel
 from rubhpc.integrate.reduced_model.touching import (
     OpenBodies,
