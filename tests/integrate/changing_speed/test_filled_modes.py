@@ -17,10 +17,8 @@ from rubhpc.integrate.reduced_model.friction_mode import mask_of, solve_friction
 from rubhpc.integrate.reduced_model.mode_tables import energies_of, tabulate
 from rubhpc.integrate.reduced_model.reduction import directions
 from rubhpc.integrate.reduced_model.touching import (
-    contact_mode_among,
-    friction_mode_among,
+    mode_among,
     open_bodies,
-    penalty_mode_among,
 )
 from rubhpc.kernels.contact_modes import enter
 from rubhpc.kernels.curved_levels import fill_level
@@ -57,11 +55,9 @@ class Sliding:
 
     def tables(self, library, reduced, base, mask, levels):
         opened = solve_contact_mode(reduced, library.gap_jacobian, library.force_direction, 0)
-        along, among = (
-            (library.gap_jacobian, library.force_direction),
-            open_bodies(reduced, base.model, opened),
-        )
-        mode = contact_mode_among(among, reduced, along, mask, None)
+        pairs = SlidingPairs(library.gap_jacobian, library.force_direction)
+        among = open_bodies(reduced, base.model, opened)
+        mode = mode_among(among, reduced, pairs, opened, mask, None)
         return measured(mode, reduced, library.slip, library._friction_of(mode), **levels)
 
 
@@ -86,7 +82,7 @@ class Sticking:
     def tables(self, library, reduced, base, mask, levels):
         pairs = self.pairs(base, reduced.spin)
         among = open_bodies(reduced, base.model, solve_friction_mode(reduced, pairs, 0))
-        mode = friction_mode_among(among, reduced, pairs, mask, None)
+        mode = mode_among(among, reduced, pairs, None, mask, None)
         return measured(mode, reduced, library.slip[:0], pairs.friction_forces(mode), **levels)
 
 
@@ -103,7 +99,7 @@ class Springs:
         penalty = self.keys(base)["pairs"]
         opened = solve_contact_mode(reduced, library.gap_jacobian, library.force_direction, 0)
         among = open_bodies(reduced, base.model, opened)
-        mode = penalty_mode_among(among, reduced, penalty, opened, mask, None)
+        mode = mode_among(among, reduced, penalty, opened, mask, None)
         damped, friction = penalty.damped(reduced, mask), library._friction_of(mode)
         tables = measured(mode, damped, library.slip, friction, **levels)
         tables.loss[0] += stored_energy(1e6, penalty.gap_jacobian, penalty.closed(mask), mode, library.width)
@@ -121,7 +117,7 @@ class StickingSprings(Sticking):
     def tables(self, library, reduced, base, mask, levels):
         pairs = self.pairs(base, reduced.spin)
         among = open_bodies(reduced, base.model, solve_friction_mode(reduced, pairs, 0))
-        mode = friction_mode_among(among, reduced, pairs, mask, None)
+        mode = mode_among(among, reduced, pairs, None, mask, None)
         damped, friction = pairs.damped(reduced, mask), pairs.friction_forces(mode)
         tables = measured(mode, damped, library.slip[:0], friction, **levels)
         tables.loss[0] += stored_energy(1e6, pairs.gap_jacobian, pairs.closed(mask), mode, library.width)

@@ -9,9 +9,7 @@ from rubhpc.integrate.reduced_model.mode_tables import Spared, tabulate
 from rubhpc.integrate.reduced_model.reduction import ReducedModel
 from rubhpc.integrate.reduced_model.touching import (
     OpenBodies,
-    contact_mode_among,
-    friction_mode_among,
-    penalty_mode_among,
+    mode_among,
 )
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK
 
@@ -76,18 +74,14 @@ def solved(bodies, law, states):
     if law == "friction":
         opened = solve_friction_mode(reduced, pairs, 0)
         among, mask = OpenBodies(reduced, opened, seen), mask_of(states)
-        modes = [friction_mode_among(bodies, reduced, pairs, mask, None) for bodies in (None, among)]
+        modes = [mode_among(bodies, reduced, pairs, opened, mask, None) for bodies in (None, among)]
         return modes, among, closed, reduced, [pairs.friction_forces(mode) for mode in modes]
     opened = solve_contact_mode(reduced, *directions, 0)
     among = OpenBodies(reduced, opened, seen)
-    if law == "penalty":
-        penalty = SlidingPairs(*directions, 3e5, 40.0)
-        modes = [penalty_mode_among(of, reduced, penalty, opened, mask, None) for of in (None, among)]
-        reduced = penalty.damped(reduced, mask)
-    else:
-        modes = [contact_mode_among(of, reduced, directions, mask, None) for of in (None, among)]
-    across = (along - pairs.gap_jacobian)[closed].T
-    return modes, among, closed, reduced, [across @ mode.switch[closed] for mode in modes]
+    sliding = SlidingPairs(*directions, *((3e5, 40.0) if law == "penalty" else ()))
+    modes = [mode_among(of, reduced, sliding, opened, mask, None) for of in (None, among)]
+    reduced = sliding.damped(reduced, mask)
+    return modes, among, closed, reduced, [sliding.friction_forces(mode) for mode in modes]
 
 
 @pytest.mark.parametrize("law", ["sliding", "penalty", "friction"])
