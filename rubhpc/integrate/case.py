@@ -218,7 +218,7 @@ def _integrate(
     n_step = n_left = 0
     per_revolution = setup.samples_per_revolution
     settings = {"spin_speed": setup.spin, "clearance": clearance}
-    begin = partial(_solve_from, setup, clearance, friction)
+    begin = partial(PiecewiseMotion, cast("ModalSetup", setup), clearance, friction)
     if recording.is_transient_direct and isinstance(march, EventDrivenMarch) and march.has_closed_form:
         motions = solved_motions(march.setup, (clearance, friction, recording))
         march, reason, n_transient, n_step, motion = pass_directly(march, begin, recording, motions)
@@ -305,18 +305,6 @@ def _counted(record: Record, n_transient: int, n_step: int, n_left: int) -> Reco
     """Note what it took to come to a record and through it."""
     record.measures.update(transient_revolutions=n_transient, steps=n_step, left_closed_form=n_left)
     return record
-
-
-def _solve_from(
-    setup: Setup,
-    clearance: float,
-    friction: float,
-    state: State | None,
-    march: EventDrivenMarch | None = None,
-) -> PiecewiseMotion:
-    """Piecewise motion of a case in closed form; a given march of it is restarted."""
-    assert isinstance(setup, ModalSetup)
-    return PiecewiseMotion(setup, clearance, friction, state, march)
 
 
 def _spectra(samples: Samples, model: Model) -> dict[str, Floats]:

@@ -157,7 +157,7 @@ class ModalSetup:
         return solve_contact_mode(self.reduced, gap_jacobian, force_direction, 0, self._known_of_ring)
 
     @cached_property
-    def _n_level(self) -> int:
+    def n_level(self) -> int:
         """Levels for which exponentials are tabulated."""
         past_sample = max(SAMPLES_AT_ONCE, self.samples_per_revolution // FEWEST_STEPS)
         return self.sample_level + past_sample.bit_length()
@@ -195,7 +195,7 @@ class ModalSetup:
                 known=known,
                 tick=self.tick,
                 sample_level=self.sample_level,
-                n_level=self._n_level,
+                n_level=self.n_level,
                 is_measured=self.is_measured,
                 among=among,
             )
@@ -287,6 +287,6 @@ class ModalSetup:
                 width=width,
                 tick=self.tick,
                 sample_level=self.sample_level,
-                n_level=self._n_level,
+                n_level=self.n_level,
             )
         return self._open_tables[friction]

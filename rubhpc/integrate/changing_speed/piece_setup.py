@@ -208,11 +208,6 @@ class PieceSetup(ModalSetup):
         return other.held is self.held and self.held.is_followed and next_acceleration == acceleration
 
     @property
-    def n_level(self) -> int:
-        """Levels for which exponentials are tabulated."""
-        return self._n_level
-
-    @property
     def _known_of_ring(self) -> Solved:
         return self.held.kept
 

@@ -447,9 +447,6 @@ class RangeLibrary(ModeLibrary):
         )
         return self._with_springs(found, mode)
 
-    def _spared(self, mode: ContactMode) -> None:
-        """None: outputs are filled in."""
-
     def _width_of(self, model: Model, friction: float) -> int:
         """Width of tables for any mode that is met later."""
         if isinstance(self._pairs, FrictionPairs):

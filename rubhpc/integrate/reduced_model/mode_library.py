@@ -15,7 +15,7 @@ from rubhpc.integrate.reduced_model.contact_mode import (
     stored_energy,
 )
 from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs
-from rubhpc.integrate.reduced_model.mode_tables import Spared, bytes_ahead, energies_of, mode_of, tabulate
+from rubhpc.integrate.reduced_model.mode_tables import bytes_ahead, energies_of, mode_of, tabulate
 from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions
 from rubhpc.integrate.reduced_model.table_stack import MOST_BYTES, MOST_MODES, TableStack
 from rubhpc.integrate.reduced_model.touching import mode_among, open_bodies
@@ -282,7 +282,7 @@ class ModeLibrary:
 
     def _tables_of(self, mode: ContactMode, reduced: ReducedModel) -> kernel.ModeTables:
         """Tables of one mode."""
-        tables = tabulate(
+        return tabulate(
             mode,
             reduced,
             self.slip,
@@ -293,19 +293,7 @@ class ModeLibrary:
             n_level=self._n_level,
             is_measured=self._is_measured,
             n_ahead=self._n_ahead,
-            spared=self._spared(mode) if self._is_measured else None,
         )
-        if mode.mask == 0:
-            self._open_output = tables.output[0]
-        return tables
-
-    def _spared(self, mode: ContactMode) -> Spared | None:
-        """Outputs of the open set that a mode shares."""
-        closed = self._pairs.closed(mode.mask)
-        touching = self._among.touching(closed) if self._among and closed and self._n_ahead else None
-        if touching is None:
-            return None
-        return Spared(mode.n_eigenmode - touching.spared.size, touching.spared, self._open_output)
 
 
 def padded_width(widest: int, q: int, *, has_stick: bool = False) -> int:

@@ -177,14 +177,6 @@ def _primitive(power: Complexes, exponent: Complexes) -> Complexes:
     return np.divide(power, exponent, out=np.zeros_like(power), where=has_one)
 
 
-class Spared(NamedTuple):
-    """Eigenmodes of the open set that another set shares."""
-
-    first: int  # place of the first one in that set
-    modes: NDArray[np.int64]  # places in the open set
-    output: Floats  # (2 m, samples o), of the open set
-
-
 def tabulate(
     mode: ContactMode,
     reduced: ReducedModel,
@@ -197,7 +189,6 @@ def tabulate(
     n_level: int,
     is_measured: bool = True,
     n_ahead: int = kernel.SAMPLES_AT_ONCE,
-    spared: Spared | None = None,
 ) -> kernel.ModeTables:
     """Tables of one mode, (1, ...) each, its coordinates padded to `width`.
 
@@ -215,8 +206,6 @@ def tabulate(
     n_ahead : int
         Samples whose outputs are read from one set of coordinates. With 1, no step may pass a sample; with 0,
         outputs are not tabulated.
-    spared : Spared, optional
-        Shared eigenmodes of the open set and its outputs, where they are known.
     """
     n, m = reduced.stiffness.shape[0], width
     end, n_filled = mode.exponent.size, len(mode.enter)
@@ -245,7 +234,7 @@ def tabulate(
     output = np.zeros((2 * m, 0))
     if is_measured:
         interval = tick * 2.0**sample_level
-        output = _outputs_beside(spared, reduced, exponent, motion, interval, n_ahead)
+        output = _outputs(reduced, exponent, motion, interval, n_ahead)
     loss, work, steady_power = energies or Energies.none(0)
     halves = np.stack([take_off.real, take_off.imag], axis=1)  # (2 + q or more, 2, m)
     row = kernel.ModeTables(
@@ -324,28 +313,6 @@ def _joined(real: Floats, imaginary: Floats) -> Complexes:
     joined = np.empty(real.shape, dtype=np.complex128)
     joined.real, joined.imag = real, imaginary
     return joined
-
-
-def _outputs_beside(
-    spared: Spared | None,
-    reduced: ReducedModel,
-    exponent: Complexes,
-    motion: Complexes,
-    interval: float,
-    n_ahead: int,
-) -> Floats:
-    """Output rows as in `_outputs`; those of shared eigenmodes are copied."""
-    if spared is None:
-        return _outputs(reduced, exponent, motion, interval, n_ahead)
-    width, first, last = exponent.size, spared.first, spared.first + spared.modes.size
-    own = np.concatenate([np.arange(first), np.arange(last, width)])
-    found = np.zeros_like(spared.output)
-    part = _outputs(reduced, exponent[own], motion[:, own], interval, n_ahead).reshape(2, own.size, -1)
-    for half in range(2):
-        rows = found[half * width : (half + 1) * width]
-        rows[own] = part[half]
-        rows[first:last] = spared.output[half * width + spared.modes]
-    return found
 
 
 def _outputs(

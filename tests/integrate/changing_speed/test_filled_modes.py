@@ -132,7 +132,7 @@ LAWS = Sliding(), Sticking(), Springs(), StickingSprings()
 def test_a_tuned_mode_is_the_mode_at_that_speed(q, law):
     base, masks = setup(q), law.masks[q]
     phasor = (base.reduced.force[0] - 1j * base.reduced.force[1]) / base.spin**2
-    levels = {"sample_level": base.sample_level, "n_level": base._n_level}
+    levels = {"sample_level": base.sample_level, "n_level": base.n_level}
     library = RangeLibrary(
         base.reduced,
         base.model,
@@ -178,7 +178,7 @@ def test_energy_balances_while_the_unbalance_force_grows(growth):
     base, spin, law = setup(3), 231.0, Sliding()
     phasor = (base.reduced.force[0] - 1j * base.reduced.force[1]) / base.spin**2
     factor = (spin**2 - 40.0j) * np.exp(0.7j)
-    levels = {"sample_level": base.sample_level, "n_level": base._n_level}
+    levels = {"sample_level": base.sample_level, "n_level": base.n_level}
     library = RangeLibrary(base.reduced, base.model, 0.2, phasor=phasor, known={}, tick=base.tick, **levels)
     library.tune(speeds_of([spin], [factor], [growth], [base.tick], base.spin, base.sample_level), 0)
     reduced, n, time = base.reduced, len(base.reduced.stiffness), 1e-3
@@ -216,7 +216,7 @@ def test_tables_of_curved_gaps_are_those_at_that_speed(q):
     factor = (spin**2 - 40.0j) * np.exp(0.7j)
     force = np.stack([(phasor * factor).real, -(phasor * factor).imag])
     reduced = replace(base.reduced, spin=spin, force=force)
-    levels = {"known": {}, "sample_level": base.sample_level, "n_level": base._n_level}
+    levels = {"known": {}, "sample_level": base.sample_level, "n_level": base.n_level}
     case = base.model, 0.2
     library = RangeCurvedLibrary(
         base.reduced, *case, phasor=phasor, at_piece=lambda: reduced, tick=base.tick, **levels

@@ -80,7 +80,7 @@ def library_of(base, law, at):
         known={},
         tick=base.tick,
         sample_level=base.sample_level,
-        n_level=base._n_level,
+        n_level=base.n_level,
         reach=REACH,
         **law.keys(base),
         beside=[at(place) for place in NODES[1:]],
@@ -97,7 +97,7 @@ def error_at(base, law, at, masks, place):
     library.tune(speeds_of([spin], [factor], [0.0], [base.tick], *held), 0)
     force = np.stack([(phasor * factor).real, -(phasor * factor).imag])
     reduced = replace(at(place), spin=spin, force=force)
-    levels = {"sample_level": base.sample_level, "n_level": base._n_level, "tick": base.tick}
+    levels = {"sample_level": base.sample_level, "n_level": base.n_level, "tick": base.tick}
     worst = 0.0
     for mask in masks:
         assert library.add(mask)
