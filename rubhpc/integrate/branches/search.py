@@ -392,7 +392,7 @@ def _aside(branching: Branching, point: Point) -> list[Point] | None:
             found = branching.correct(base, length * along, along)
         except NotConverged:
             continue
-        if branching.length_of(found, half_change(found)) < length:
+        if np.linalg.norm(found.scale * half_change(found)) < length:
             continue  # the motion that has not doubled
         moved = branching.difference(base, found)
         if found.sequence == base.sequence and np.linalg.norm(moved - length * along) < OFF_SIDE * length:

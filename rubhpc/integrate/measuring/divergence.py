@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
-    from rubhpc.schema import Variable
     from rubhpc.study.study import Recording
 
     Floats = NDArray[np.float64]
@@ -96,8 +95,9 @@ def diverged_record(
         "order": n_sample // 2 + 1,
         "section": recording.revolutions,
     }
+    variables = VARIABLES | probe_variables(recording.probed) | lyapunov_variables(recording.lyapunov)
     groups: dict[str, dict[str, Any]] = {"waveform": {}, "spectrum": {}, "section": {}, "measure": {}}
-    for name, variable in _variables_of(recording).items():
+    for name, variable in variables.items():
         if variable.role == "measure" and not variable.dims:
             groups["measure"][name] = -1 if variable.dtype.startswith("int") else np.nan
         elif variable.role == "measure" or variable.role in recording.keep:
@@ -122,8 +122,3 @@ def diverged_record(
         probed=recording.probed,
         n_exponent=recording.lyapunov,
     )
-
-
-def _variables_of(recording: Recording) -> dict[str, Variable]:
-    """Variables of such a record."""
-    return VARIABLES | probe_variables(recording.probed) | lyapunov_variables(recording.lyapunov)

@@ -120,7 +120,7 @@ def modes_of(system: Floats, known: Solved | None = None) -> tuple[Complexes, Co
     exponents: list[Complexes] = [np.zeros(0, dtype=np.complex128)]  # a mass on a rigid wall has no modes
     shapes: list[Complexes] = [np.zeros((n_state, 0), dtype=np.complex128)]
     inverses: list[Complexes] = [np.zeros((0, n_state), dtype=np.complex128)]
-    for rows in _parts(system):
+    for rows in coupled_rows(system != 0.0):
         part = system[np.ix_(rows, rows)]
         name = _name_of(part) if known else b""
         solved = known.get(name) if known else None
@@ -184,7 +184,7 @@ def _inverse(shape: Complexes, worst: float) -> Complexes | None:
 
 def solve_parts(system: Floats) -> Solved:
     """All parts of a system, solved, for `modes_of`."""
-    parts = (system[np.ix_(rows, rows)] for rows in _parts(system))
+    parts = (system[np.ix_(rows, rows)] for rows in coupled_rows(system != 0.0))
     return {name: solve_part(part) for name, part in {_name_of(part): part for part in parts}.items()}
 
 
@@ -196,23 +196,12 @@ def _name_of(part: Floats) -> bytes:
 
 def parts_of(system: Floats, q: int) -> list[NDArray[np.int64]]:
     """Rows of each uncoupled part; all rows for one pair, where separation saves little."""
-    return _parts(system) if q > 1 else [np.arange(len(system))]
-
-
-def _parts(system: Floats) -> list[NDArray[np.int64]]:
-    """Rows of each uncoupled part of a system."""
-    return _rows_of_parts((system != 0.0).tobytes(), len(system))
-
-
-@lru_cache(maxsize=32)
-def _rows_of_parts(linked: bytes, n: int) -> list[NDArray[np.int64]]:
-    """The same from the nonzero pattern (n, n)."""
-    return coupled_rows(np.frombuffer(linked, dtype=bool).reshape(n, n))
+    return coupled_rows(system != 0.0) if q > 1 else [np.arange(len(system))]
 
 
 def count_modes(system: Floats) -> int:
     """Count the eigenmodes of a system, one of each conjugate pair."""
-    exponents = (np.linalg.eigvals(system[np.ix_(rows, rows)]) for rows in _parts(system))
+    exponents = (np.linalg.eigvals(system[np.ix_(rows, rows)]) for rows in coupled_rows(system != 0.0))
     return sum(int(np.count_nonzero(_kept(exponent.astype(np.complex128))[1])) for exponent in exponents)
 
 
