@@ -74,7 +74,6 @@ class HeldMatrices:
         self._phasor, self._reach = phasor, reach
         self._slope = slope  # N m s, of a drive's torque over the speed
         self._libraries: dict[tuple[Kind, float], RangeLibrary] = {}
-        self._pairs: dict[float, FrictionPairs] = {}
         self._latest: tuple[tuple[float, ...], Model] | None = None  # by request
         self.first: tuple[tuple[float, ...], object] | None = None  # block of a case, by what was asked
 
@@ -172,12 +171,6 @@ class HeldMatrices:
         library.tune(piece.speeds, piece.place)
         return library
 
-    def pairs(self, friction: float, make: Callable[[float], FrictionPairs]) -> FrictionPairs:
-        """The pairs of a friction, with the rims at the speed of some piece."""
-        if friction not in self._pairs:
-            self._pairs[friction] = make(friction)
-        return self._pairs[friction]
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PieceSetup(ModalSetup):
@@ -243,12 +236,6 @@ class PieceSetup(ModalSetup):
 
     def _find(self, kind: Kind, friction: float) -> ModeLibrary:
         return self.held.tuned(kind, self, friction)
-
-    def friction_pairs(self, friction: float) -> FrictionPairs:
-        """The pairs of a friction."""
-        pairs = self.held.pairs(friction, super().friction_pairs)
-        radius = np.array([stator.radius for stator in self.model.stators])
-        return with_values(pairs, rim_speed=radius * abs(self.spin))
 
     def pairs_of_range(self, kind: Kind, friction: float) -> SlidingPairs | FrictionPairs:
         """The pairs of a kind and a friction in the middle of the range."""
