@@ -13,13 +13,12 @@ from rubhpc.input.messages import brief
 from rubhpc.input.quantity import parse_quantity
 from rubhpc.integrate.branches.branch import branch_of
 from rubhpc.integrate.branches.branching import Branching
-from rubhpc.integrate.branches.search import search
-from rubhpc.integrate.branches.start import shot, simulated, starts
-from rubhpc.integrate.initial_state import fit_to_gaps
+from rubhpc.integrate.branches.search import search, shot, simulated, starts
 from rubhpc.integrate.periodic_motions.family import CLEARANCES, SPEEDS, Family, Operation
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion, Unfollowed
 from rubhpc.integrate.periodic_motions.shooting import NotConverged
 from rubhpc.integrate.record import State
+from rubhpc.integrate.start import fit_to_gaps
 from rubhpc.rig.reading import read_rig
 from rubhpc.rig.rig import Rig
 from rubhpc.rig.stators import gap_problem

@@ -6,11 +6,10 @@ import math
 import time
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from rubhpc.integrate.closed_form_case import exponents_of, give_back, judge_of, trail_of
 from rubhpc.integrate.compilation import (
     COMMON,
     CURVED,
@@ -21,38 +20,41 @@ from rubhpc.integrate.compilation import (
     STICK,
     seconds_compiling,
 )
-from rubhpc.integrate.initial_state import fit_to_gaps, with_overlap
-from rubhpc.integrate.marched_record import Marched, march_record
+from rubhpc.integrate.lyapunov import Growth, Marches
+from rubhpc.integrate.marched_record import Marched, march_record, repeat_period
 from rubhpc.integrate.marches.central_difference import CentralDifferenceMarch
 from rubhpc.integrate.marches.closed_form import closed_form_march
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
 from rubhpc.integrate.marches.curved import CurvedMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.marches.met_modes import NoClosedForm
-from rubhpc.integrate.measuring.carried import carrier_displacement
-from rubhpc.integrate.measuring.diverged_record import diverged_record
+from rubhpc.integrate.measuring.divergence import diverged_record
 from rubhpc.integrate.measuring.measures import measures_of
-from rubhpc.integrate.measuring.monitors import monitored
+from rubhpc.integrate.measuring.monitors import carrier_displacement, monitored
+from rubhpc.integrate.measuring.orbit_measures import period
+from rubhpc.integrate.measuring.regimes import LASTING, LEAST_REVOLUTIONS, by_growth, regime
 from rubhpc.integrate.measuring.samples import (
     add_sag,
     by_name,
     probe_extents,
     samples_within,
 )
+from rubhpc.integrate.measuring.settling import is_steady
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.periodic_motions.direct import pass_directly
+from rubhpc.integrate.periodic_motions.lyapunov_spectrum import spectrum_of
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.periodic_motions.proof import Solver
 from rubhpc.integrate.periodic_motions.solved_motion import SolvedMotion, solved_motions
 from rubhpc.integrate.record import Record, State
-from rubhpc.integrate.repeated_record import repeat_period
 from rubhpc.integrate.scheme import Scheme
-from rubhpc.integrate.start import start_of
+from rubhpc.integrate.start import fit_to_gaps, start_of, with_overlap
 from rubhpc.integrate.tangent_motion import TangentMotion
 from rubhpc.integrate.transient import pass_revolutions, pass_transient
 from rubhpc.kernels._jit import plain
 from rubhpc.kernels.laws import is_set_valued
-from rubhpc.schema import DONE, SECTION_NAMES
+from rubhpc.kernels.trail import BROKEN
+from rubhpc.schema import DONE, REGIME, SECTION_NAMES, lyapunov_variables
 from rubhpc.spectra import amplitude_spectrum
 from rubhpc.study.initial import Initial
 
@@ -62,7 +64,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
+    from rubhpc.integrate.lyapunov import Neighbours
     from rubhpc.integrate.marches.march import March
+    from rubhpc.integrate.measuring.measures import Judge
+    from rubhpc.integrate.measuring.regimes import Verdict
     from rubhpc.integrate.setup import Setup
     from rubhpc.kernels.accumulators import Samples
     from rubhpc.kernels.trail import Trail
@@ -77,6 +82,8 @@ MARCHES: dict[Scheme, Callable[..., March]] = {
     Scheme.CONTACT_STEPPING: ContactSteppingMarch,
     Scheme.CENTRAL_DIFFERENCE: CentralDifferenceMarch,
 }
+
+_spare: list[Trail] = []  # arrays of the last case, unless another one uses them
 
 
 def march_of(scheme: Scheme, setup: Setup) -> Callable[..., March]:
@@ -105,8 +112,8 @@ def run_case(
     friction : float
         Coefficient of friction.
     initial : State or Initial, optional
-        Where to start, with the unbalance at its phase 0; default: at rest (`initial_state.at_rest`). The
-        final state of another case is fitted to the gaps of this one (`initial_state.fit_to_gaps`).
+        Where to start, with the unbalance at its phase 0; default: at rest (`start.at_rest`). The
+        final state of another case is fitted to the gaps of this one (`start.fit_to_gaps`).
     check : callable, optional
         Called between kernel calls, a quarter of a second apart at most; what it raises ends the case.
     say : callable
@@ -211,7 +218,7 @@ def _integrate(
     n_step = n_left = 0
     per_revolution = setup.samples_per_revolution
     settings = {"spin_speed": setup.spin, "clearance": clearance}
-    begin = partial(_solve_from, setup, clearance, friction)
+    begin = partial(PiecewiseMotion, cast("ModalSetup", setup), clearance, friction)
     if recording.is_transient_direct and isinstance(march, EventDrivenMarch) and march.has_closed_form:
         motions = solved_motions(march.setup, (clearance, friction, recording))
         march, reason, n_transient, n_step, motion = pass_directly(march, begin, recording, motions)
@@ -300,19 +307,127 @@ def _counted(record: Record, n_transient: int, n_step: int, n_left: int) -> Reco
     return record
 
 
-def _solve_from(
-    setup: Setup,
-    clearance: float,
-    friction: float,
-    state: State | None,
-    march: EventDrivenMarch | None = None,
-) -> PiecewiseMotion:
-    """Piecewise motion of a case in closed form; a given march of it is restarted."""
-    assert isinstance(setup, ModalSetup)
-    return PiecewiseMotion(setup, clearance, friction, state, march)
-
-
 def _spectra(samples: Samples, model: Model) -> dict[str, Floats]:
     """Spectra of all signals, by their names in the schema."""
     spectra = by_name(amplitude_spectrum(samples.whole), model)
     return {f"spectrum_{name}": spectrum for name, spectrum in spectra.items()}
+
+
+def exponents_of(
+    march: March, begin: Callable[[State], PiecewiseMotion], final: State, n_exponent: int
+) -> dict[str, float]:
+    """Lyapunov exponents from where a march has ended; NaN where it has no closed form."""
+    if isinstance(march, EventDrivenMarch) and march.has_closed_form:
+        found = spectrum_of(partial(begin, final), n_exponent)
+        largest = found["lyapunov_1"]
+        return found if math.isnan(largest) else found | {"lyapunov_exponent": largest}
+    return dict.fromkeys(lyapunov_variables(n_exponent), math.nan)
+
+
+def judge_of(
+    march: March,
+    start: Callable[[State], March],
+    setup: Setup,
+    clearance: float,
+    friction: float,
+    recording: Recording,
+    final: State,
+    trail: Trail | None,
+) -> Judge:
+    """What judges a simulated record: its orbit, neighbouring motions and periodic ones."""
+    solver = solver_of(march, setup, clearance, friction, final)
+    growth = Growth(lambda: neighbours_of(march, trail, start, final, setup, recording))
+
+    def lasts(exponent: float) -> bool:
+        """Whether chaos was followed to the end of what is followed, does not drift and is chaos there."""
+        if solver is None or solver.followed is None:
+            return False
+        energy, end = solver.followed
+        if not is_steady(energy):
+            return False
+        if trail is not None:
+            trail.n_event[0] = BROKEN  # its room alone is used again
+        try:
+            flag, later = by_growth(Growth(lambda: neighbours_of(march, trail, start, end, setup, recording)))
+        except NoClosedForm:
+            return False
+        return flag == REGIME.index("chaotic") and exponent + later >= 2.0 * LASTING
+
+    def judge(vertical: Floats, horizontal: Floats, per_revolution: int, is_contact: bool) -> Verdict:
+        return regime(
+            vertical,
+            horizontal,
+            per_revolution,
+            period=period(vertical, horizontal, per_revolution),
+            is_contact=is_contact,
+            growth=growth,
+            within=growth.within,
+            solve=solver,
+            later=solver.later if solver is not None else None,
+            lasts=lasts if solver is not None else None,
+            n_event=trail.n_event[0] / recording.revolutions if trail is not None else 0.0,
+        )
+
+    return judge
+
+
+def solver_of(
+    march: March,
+    setup: Setup,
+    clearance: float,
+    friction: float,
+    final: State,
+) -> Solver | None:
+    """Solver for periodic motions near the end of a march; None where it has no closed form."""
+    if isinstance(march, EventDrivenMarch) and march.has_closed_form and isinstance(setup, ModalSetup):
+        return Solver(setup, clearance, friction, final, march)
+    return None
+
+
+def trail_of(march: March, recording: Recording) -> Trail | None:
+    """Record the events of a record where its tangent may be propagated along them."""
+    if (
+        isinstance(march, EventDrivenMarch)
+        and march.has_closed_form
+        and recording.revolutions >= LEAST_REVOLUTIONS
+    ):
+        trail = _kept(march) or march.new_trail()
+        march.keep(trail)
+        return trail
+    return None
+
+
+def give_back(march: March, trail: Trail | None) -> None:
+    """Keep the arrays of a trail for the next case, when nothing reads or writes them any more.
+
+    The system clears new memory page by page, which takes longer than following the tangent.
+    """
+    if trail is not None:
+        cast("EventDrivenMarch", march).keep(None)
+        _spare[:] = [trail]
+
+
+def _kept(march: EventDrivenMarch) -> Trail | None:
+    """Kept arrays, if they fit a march."""
+    try:
+        trail = _spare.pop()
+    except IndexError:
+        return None
+    width = trail.begun.shape[2], trail.given.shape[2]
+    return trail if width == march.width else None
+
+
+def neighbours_of(
+    march: March,
+    trail: Trail | None,
+    start: Callable[[State], March],
+    final: State,
+    setup: Setup,
+    recording: Recording,
+) -> Neighbours:
+    """A motion next to the one from the end of a march."""
+    if isinstance(march, EventDrivenMarch) and march.has_closed_form:
+        return TangentMotion(
+            cast("Callable[[State], EventDrivenMarch]", start), final, setup, recording, trail, march
+        )
+    return Marches(start, final, setup, recording)

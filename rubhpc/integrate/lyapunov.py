@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from rubhpc.integrate.following import count_followed
 from rubhpc.integrate.measuring.regimes import N_ALL
 from rubhpc.integrate.transient import pass_revolutions
 
@@ -25,10 +24,23 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
+
+_followed = [0]
+
 SPAN = 4  # revolutions: few enough that neighbours stay close
 N_ALIGNING = 4  # spans in which the displacement turns into the direction of largest growth
 DISPLACED = 1e-5  # of the motion: far above the resolution of events, far below details of the motion
 LOST = 1e-6  # of the displacement: less is rounding
+
+
+def n_followed() -> int:
+    """Revolutions that this process has followed after records so far; of two motions, those of both."""
+    return _followed[0]
+
+
+def count_followed(n_revolution: int) -> None:
+    """Add to `n_followed`."""
+    _followed[0] += n_revolution
 
 
 class Neighbours(Protocol):

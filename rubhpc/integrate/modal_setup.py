@@ -6,28 +6,24 @@ import math
 from collections import Counter
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from rubhpc.integrate.measuring.divergence import energy_limit
 from rubhpc.integrate.reduced_model.contact_mode import (
     ContactMode,
+    SlidingPairs,
     confine,
     solve_contact_mode,
 )
 from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
-from rubhpc.integrate.reduced_model.energy_forms import energies_of
-from rubhpc.integrate.reduced_model.friction_library import FrictionLibrary
 from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs, solve_friction_mode
 from rubhpc.integrate.reduced_model.mode_library import (
     ModeLibrary,
-    Shared,
     width_without_modes,
 )
-from rubhpc.integrate.reduced_model.mode_tables import tabulate
-from rubhpc.integrate.reduced_model.penalty_library import PenaltyLibrary
-from rubhpc.integrate.reduced_model.penalty_mode import Penalty
+from rubhpc.integrate.reduced_model.mode_tables import energies_of, tabulate
 from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions, kernel_bodies
 from rubhpc.integrate.reduced_model.system_modes import KeptParts, solve_parts
 from rubhpc.integrate.reduced_model.touching import OpenBodies, open_bodies
@@ -54,7 +50,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-L = TypeVar("L", bound=ModeLibrary)
+Kind = Literal["sliding", "curved", "penalty", "friction"]  # of contact modes
 FINEST_TICK = 1.9e-10  # s
 CONTACT_STEPS = 1024  # per revolution, at least, while recording a contact
 LONGEST_TURN = FINEST_TICK * 2**46  # s, 3.7 hours: 64 bits count the ticks of a hundred thousand revolutions
@@ -78,10 +74,7 @@ class ModalSetup:
     accuracy: float = 1e-3  # relative, of the modes kept, and of loads where gaps are curved
     free_spin: FreeSpin | None = None  # of a driven rotor
     is_measured: bool = True  # False: tables have no outputs and energies
-    _libraries: dict[float, ModeLibrary] = field(default_factory=dict)
-    _curved_libraries: dict[float, CurvedLibrary] = field(default_factory=dict)
-    _friction_libraries: dict[float, FrictionLibrary] = field(default_factory=dict)
-    _penalty_libraries: dict[float, PenaltyLibrary] = field(default_factory=dict)
+    _libraries: dict[tuple[Kind, float], ModeLibrary] = field(default_factory=dict)
     _open_tables: dict[float, ModeTables] = field(default_factory=dict)
 
     @cached_property
@@ -164,38 +157,56 @@ class ModalSetup:
         return solve_contact_mode(self.reduced, gap_jacobian, force_direction, 0, self._known_of_ring)
 
     @cached_property
-    def _n_level(self) -> int:
+    def n_level(self) -> int:
         """Levels for which exponentials are tabulated."""
         past_sample = max(SAMPLES_AT_ONCE, self.samples_per_revolution // FEWEST_STEPS)
         return self.sample_level + past_sample.bit_length()
 
     def library(self, friction: float) -> ModeLibrary:
         """Contact modes of a friction, shared by its cases."""
-        if friction not in self._libraries:
-            self._libraries[friction] = self._make_library(ModeLibrary, friction)
-        return self._libraries[friction]
+        return self._find("sliding", friction)
 
-    def curved_library(self, friction: float) -> CurvedLibrary:
-        """Contact modes of a friction with tables for curved gaps, shared by its cases."""
-        if friction not in self._curved_libraries:
-            self._curved_libraries[friction] = self._make_library(CurvedLibrary, friction)
-        return self._curved_libraries[friction]
+    def curved_library(self, friction: float) -> ModeLibrary:
+        """The same with tables for curved gaps."""
+        return self._find("curved", friction)
 
-    def _make_library(self, kind: type[L], friction: float) -> L:
-        return kind(self.reduced, self.model, friction, **self._shared)
+    def penalty_library(self, friction: float) -> ModeLibrary:
+        """The same under a penalty."""
+        return self._find("penalty", friction)
 
-    @property
-    def _shared(self) -> Shared:
-        """Arguments of all libraries; that of Coulomb's law has further ones."""
-        return {
-            "opened": self._opened,
-            "known": self._known_of_ring,
-            "tick": self.tick,
-            "sample_level": self.sample_level,
-            "n_level": self._n_level,
-            "is_measured": self.is_measured,
-            "among": self._among,
-        }
+    def friction_library(self, friction: float) -> ModeLibrary:
+        """Contact modes of a friction whose slip may reverse, shared by its cases."""
+        return self._find("friction", friction)
+
+    def _find(self, kind: Kind, friction: float) -> ModeLibrary:
+        if (kind, friction) not in self._libraries:
+            opened, known, among = self._opened, self._known_of_ring, self._among
+            pairs = self._pairs(kind, friction)
+            if isinstance(pairs, FrictionPairs):
+                known = self._known
+                opened = solve_friction_mode(self.reduced, pairs, 0, known)
+                among = open_bodies(self.reduced, self.model, opened)
+            self._libraries[kind, friction] = (CurvedLibrary if kind == "curved" else ModeLibrary)(
+                self.reduced,
+                self.model,
+                friction,
+                pairs=pairs,
+                opened=opened,
+                known=known,
+                tick=self.tick,
+                sample_level=self.sample_level,
+                n_level=self.n_level,
+                is_measured=self.is_measured,
+                among=among,
+            )
+        return self._libraries[kind, friction]
+
+    def _pairs(self, kind: Kind, friction: float) -> SlidingPairs | FrictionPairs:
+        """The pairs of the contact modes of a kind and a friction."""
+        if kind == "friction":
+            return self.friction_pairs(friction)
+        along = directions(self.reduced, self.model, friction)[:2]
+        return SlidingPairs(*along, *((self.law.stiffness, self.law.damping) if kind == "penalty" else ()))
 
     @cached_property
     def _among(self) -> OpenBodies | None:
@@ -228,26 +239,12 @@ class ModalSetup:
             damping=self.law.damping,
         )
 
-    def friction_library(self, friction: float) -> ModeLibrary:
-        """Contact modes of a friction whose slip may reverse, shared by its cases."""
-        if friction not in self._friction_libraries:
-            pairs = self.friction_pairs(friction)
-            opened = solve_friction_mode(self.reduced, pairs, 0, self._known)
-            among = open_bodies(self.reduced, self.model, opened)
-            shared: Shared = {**self._shared, "opened": opened, "known": self._known, "among": among}
-            self._friction_libraries[friction] = FrictionLibrary(self.reduced, self.model, pairs, **shared)
-        return self._friction_libraries[friction]
-
-    @property
-    def _all_libraries(self) -> tuple[dict[float, Any], ...]:
-        return self._libraries, self._curved_libraries, self._friction_libraries, self._penalty_libraries
-
     @property
     def n_byte(self) -> dict[float, int]:
         """Memory of the tables of contact modes, bytes, by friction."""
         found: Counter[float] = Counter()
-        for held in self._all_libraries:
-            found.update({friction: library.n_byte for friction, library in held.items()})
+        for (_, friction), library in self._libraries.items():
+            found[friction] += library.n_byte
         return found
 
     @property
@@ -258,31 +255,21 @@ class ModalSetup:
 
     def n_solved(self, friction: float) -> int:
         """Number of contact modes of a friction that were solved, including repeated ones."""
-        return sum(held[friction].n_solved for held in self._all_libraries if friction in held)
+        return sum(library.n_solved for (_, of), library in self._libraries.items() if of == friction)
 
     def forget(self, friction: float) -> None:
         """Free the contact modes of a friction."""
         self._open_tables.pop(friction, None)
         self._bodies.pop(friction, None)
-        for held in self._all_libraries:
-            held.pop(friction, None)
-        if not any(self._all_libraries):  # and the shared parts, except those with every pair open
+        for key in [key for key in self._libraries if key[1] == friction]:
+            del self._libraries[key]
+        if not self._libraries:  # and the shared parts, except those with every pair open
             vars(self).pop("_known", None)
-
-    def penalty_library(self, friction: float) -> ModeLibrary:
-        """Contact modes of a friction under a penalty, shared by its cases."""
-        if friction not in self._penalty_libraries:
-            gap_jacobian, force_direction, _ = directions(self.reduced, self.model, friction)
-            penalty = Penalty(self.law.stiffness, self.law.damping, gap_jacobian, force_direction)
-            self._penalty_libraries[friction] = PenaltyLibrary(
-                self.reduced, self.model, friction, penalty=penalty, **self._shared
-            )
-        return self._penalty_libraries[friction]
 
     def open_tables(self, friction: float) -> ModeTables:
         """Tables of the open mode alone, with the width of the friction's library."""
         if friction not in self._open_tables:
-            library = self._libraries.get(friction)
+            library = self._libraries.get(("sliding", friction))
             width = (
                 library.width
                 if library
@@ -300,6 +287,6 @@ class ModalSetup:
                 width=width,
                 tick=self.tick,
                 sample_level=self.sample_level,
-                n_level=self._n_level,
+                n_level=self.n_level,
             )
         return self._open_tables[friction]

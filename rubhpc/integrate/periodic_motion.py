@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from rubhpc.errors import InputError, NoPeriodicMotion
 from rubhpc.integrate.case import run_case
-from rubhpc.integrate.initial_state import fit_to_gaps
 from rubhpc.integrate.marches.closed_form import closed_form_march
 from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.modal_setup import ModalSetup
@@ -21,7 +20,7 @@ from rubhpc.integrate.periodic_motions.revolution import least_of
 from rubhpc.integrate.periodic_motions.shooting import NotConverged, Orbit, shoot
 from rubhpc.integrate.record import Record, State
 from rubhpc.integrate.scheme import Scheme
-from rubhpc.integrate.start import start_of
+from rubhpc.integrate.start import fit_to_gaps, start_of
 from rubhpc.integrate.transient import pass_revolutions
 from rubhpc.schema import REGIME
 from rubhpc.spectra import amplitude_spectrum

@@ -1,4 +1,4 @@
-"""Start of a case: at rest, contact-free or at the final state of another; displaced or knocked."""
+"""Start of a case: at rest, contact-free or at the end of another; displaced, knocked, fitted to gaps."""
 
 from __future__ import annotations
 
@@ -10,10 +10,16 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from rubhpc.errors import InputError
+from rubhpc.fem.constraints import rigid_body_row
+from rubhpc.fem.model import state_size
 from rubhpc.fem.response import check_response_node, steady_response
 from rubhpc.fem.stability import instability_message
-from rubhpc.integrate.initial_state import at_rest, fit_to_gaps, static_shapes
+from rubhpc.integrate.modal_setup import ModalSetup
+from rubhpc.integrate.packing import degrees_of
 from rubhpc.integrate.record import State
+from rubhpc.kernels.complementarity import UNSOLVED
+from rubhpc.kernels.contact_pairs import AXIAL, V, W, normal_and_gap
+from rubhpc.kernels.lemke import solve_lemke
 from rubhpc.study.initial import CONTACT_FREE, REST
 
 if TYPE_CHECKING:
@@ -26,6 +32,174 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
+TOLERANCE = 1e-12  # m, a hundred times the tolerance of the integrators: a continued run is not changed
+PARTED = 1e-9  # m, beyond which a closed contact has opened
+TURNED = 1e-10  # of the forces, by which they may have turned with their normals in the last pass
+LEAST_FORCE = np.finfo(float).tiny  # N, least force that marks a contact as closed
+MOST_PASSES = 20  # for the curved gap of the updated normal; three or four are usual
+
+
+def fit_to_gaps(state: State, setup: Setup, clearance: float) -> State:
+    """Return a state as the start of a case: no gap overlaps more than before, and none is pulled shut.
+
+    Parameters
+    ----------
+    state : State
+        Final state of another case; its `overlap` is that allowed by a penalty.
+    clearance : float, m
+        Radial clearance at rest; a stator's `clearance_offset` is added.
+
+    Raises
+    ------
+    InputError
+        The state is of a rig with other degrees of freedom, or the stators leave no room for the shaft.
+    """
+    if state.packed().size != state_size(setup.model):
+        raise InputError(
+            f"initial: a state of {state.packed().size} numbers for a rig of {state_size(setup.model)}; "
+            "use it only for cases with the same degrees of freedom"
+        )
+    return _fitted(state, setup, clearance)[0]
+
+
+def _fitted(state: State, setup: Setup, clearance: float, softness: float = 0.0) -> tuple[State, bool]:
+    """The state of `fit_to_gaps`, whose gaps give by `softness`, m/N, and whether its forces are found."""
+    allowed = np.zeros_like(state.contact_force) if state.overlap is None else state.overlap
+    begin = displacement = _as_seen(state.displacement, setup)
+    gap, gap_jacobian = gaps(displacement, setup, clearance)
+    force, is_found = np.zeros_like(gap), not np.any(gap + allowed < -TOLERANCE)
+    if not is_found:
+        for _ in range(MOST_PASSES):
+            shape = static_shapes(gap_jacobian.T, setup)
+            compliance = gap_jacobian @ shape + softness * np.eye(gap.size)
+            force = _least_forces(compliance, gap + allowed + gap_jacobian @ (begin - displacement))
+            displacement = begin + shape @ force
+            before = gap_jacobian
+            gap, gap_jacobian = gaps(displacement, setup, clearance)
+            excess = gap + allowed + softness * force
+            is_turned = np.abs((gap_jacobian - before).T @ force).max() > TURNED * force.max()
+            is_shut = np.all(excess >= -TOLERANCE) and np.all(excess[force > 0.0] <= TOLERANCE)
+            if is_found := bool(is_shut and not is_turned):
+                break
+        rotor, *stators = setup.model.split(displacement)
+        state = replace(state, rotor_displacement=rotor, stator_displacement=tuple(stators))
+    is_closed = (state.contact_force > 0.0) & (gap <= PARTED)
+    state = replace(state, contact_force=np.where(is_closed, state.contact_force + force, 0.0))
+    return state, is_found
+
+
+def at_rest(setup: Setup, clearance: float) -> State:
+    """Return the shaft at rest under its constant loads, on stators that it reaches, without friction.
+
+    Clearance in m; stators carry the weight that rests on them, and the springs of a penalty give by it.
+
+    Raises
+    ------
+    InputError
+        The stators leave no room for the shaft, or do not hold it.
+    """
+    state = State.at_rest(setup.model)
+    gap, _ = gaps(state.displacement, setup, clearance)
+    if not np.any(gap < 0.0):
+        return state
+    state = replace(state, contact_force=np.full(gap.size, LEAST_FORCE))  # some may be pushed onto others
+    spring = setup.law.stiffness
+    state, is_found = _fitted(state, setup, clearance, softness=1.0 / spring if spring else 0.0)
+    force = state.contact_force
+    state = replace(state, contact_force=np.where(force > LEAST_FORCE, force, 0.0))
+    is_held = isinstance(setup, ModalSetup) or not state.contact_force.any()  # the former takes no others
+    if not is_held:
+        pressed = gaps(state.displacement, setup, clearance)[1][state.contact_force > 0.0].any(axis=0)
+        is_held = not np.any(pressed & _unheld(setup.model))
+    if not (is_found and is_held):
+        raise InputError(
+            "initial: the shaft finds no rest on the stators that it reaches; constrain them, or set "
+            'from = "contact_free"'
+        )
+    return with_overlap(state, setup, clearance) if spring else state
+
+
+def with_overlap(state: State, setup: Setup, clearance: float) -> State:
+    """Return the final state of a case with the overlap of its gaps."""
+    gap, _ = gaps(state.displacement, setup, clearance)
+    return replace(state, overlap=np.maximum(-gap, 0.0))
+
+
+def gaps(displacement: Floats, setup: Setup, clearance: float) -> tuple[Floats, Floats]:
+    """Gap of each pair (q,), m, and its change with each degree of the bodies (q, n_dof)."""
+    model = setup.model
+    degree = degrees_of(model)
+    gap, gap_jacobian = np.zeros(len(degree)), np.zeros((len(degree), displacement.size))
+    for i, (stator, rows) in enumerate(zip(model.stators, degree, strict=True)):
+        at = np.where(rows >= 0, displacement[rows], 0.0)
+        at[[V, W]] -= stator.centre
+        body = slice(model.stator_start[i], model.stator_start[i] + stator.body.n_dof)
+        drawn = np.zeros(stator.body.n_dof)
+        if stator.squared_slope is not None:
+            drawn = stator.squared_slope @ displacement[body]
+            at[AXIAL] += 0.5 * displacement[body] @ drawn
+        ey, ez = float(np.cos(stator.angle)), float(np.sin(stator.angle))
+        reach = clearance + stator.clearance_offset
+        ny, nz, gap[i] = normal_and_gap(ey, ez, stator.radius, reach, 0.0, setup.is_updated, at)
+        change = np.array([-ny, -nz, 0.0, ny * ey + nz * ez, ny * -ez + nz * ey])
+        gap_jacobian[i, rows[rows >= 0]] = change[rows >= 0]
+        gap_jacobian[i, body] += change[AXIAL] * drawn
+    return gap, gap_jacobian
+
+
+def _as_seen(displacement: Floats, setup: Setup) -> Floats:
+    """Displacement of all bodies that the integrator can represent in its reduced coordinates."""
+    if not isinstance(setup, ModalSetup):
+        return displacement
+    n, sag = setup.model.rotor.n_dof, setup.model.sag
+    moved = displacement.copy()
+    moved[:n] -= sag
+    seen: Floats = setup.reduced.basis @ (setup.reduced.project @ moved)
+    seen[:n] += sag
+    return seen
+
+
+def static_shapes(force: Floats, setup: Setup) -> Floats:
+    """Static displacements (n_dof, k) under forces (n_dof, k); free bodies follow by their inertia."""
+    if isinstance(setup, ModalSetup):
+        basis, stiffness = setup.reduced.basis, setup.reduced.stiffness
+        shapes: Floats = basis @ np.linalg.solve(stiffness, basis.T @ force)
+        return shapes
+    packed = setup.packed
+    resisting, is_seen = packed.stiffness, packed.row >= 0
+    unheld = np.zeros(len(resisting))
+    unheld[packed.row[is_seen]] = _unheld(setup.model)[is_seen]
+    resisting = resisting + setup.spin**2 * unheld[:, np.newaxis] * packed.mass
+    ordered = np.zeros((len(resisting), force.shape[1]))
+    ordered[packed.row[is_seen]] = force[is_seen]
+    shapes = np.zeros_like(force)
+    shapes[is_seen] = np.linalg.solve(resisting, ordered)[packed.row[is_seen]]
+    return shapes
+
+
+def _unheld(model: Model) -> NDArray[np.bool_]:
+    """Degrees (n_all,) of parts with a rigid-body mode, which have no static displacement."""
+    is_free = [np.zeros(body.n_dof, dtype=bool) for body in model.bodies]
+    for body, rows in zip(model.bodies, is_free, strict=True):
+        for number in range(body.part.max(initial=-1) + 1):
+            is_part = body.part == number
+            rows[is_part] = rigid_body_row(body, np.flatnonzero(is_part).tolist()) > 0
+    return np.concatenate(is_free)
+
+
+def _least_forces(compliance: Floats, gap: Floats) -> Floats:
+    """Compressive forces (q,), N, that leave no gap below zero; some, where walls share them."""
+    q = gap.size
+    scale = np.abs(compliance).max()
+    tableau = np.hstack([np.eye(q), -compliance / scale, -np.ones((q, 1)), gap[:, None]])
+    basis = np.arange(q)
+    if solve_lemke(tableau, basis, q) == UNSOLVED:
+        raise InputError("initial: the stators leave no room for the shaft; take a larger clearance")
+    force = np.zeros(2 * q + 1)
+    force[basis] = np.maximum(tableau[:, -1], 0.0) / scale
+    return force[q : 2 * q]
+
+
 def start_of(initial: Initial, setup: Setup, clearance: float, spin: float | None = None) -> State:
     """Return the state in which a case starts, the unbalance at its phase 0.
 
@@ -35,7 +209,7 @@ def start_of(initial: Initial, setup: Setup, clearance: float, spin: float | Non
         Displacement and velocity of the output node, and an impulse, on top of a motion.
     clearance : float, m
         Radial clearance at rest; a stator's `clearance_offset` is added. Overlaps are removed
-        (`initial_state.fit_to_gaps`).
+        (`fit_to_gaps`).
     spin : float, rad/s, optional
         Of the contact-free motion, by default that of the set-up; with changing speed, the first one.
 

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.following import count_followed
-from rubhpc.integrate.lyapunov import N_ALIGNING, SPAN, Marches
+from rubhpc.integrate.lyapunov import N_ALIGNING, SPAN, Marches, count_followed
 from rubhpc.integrate.marches.friction import FrictionMarch
 from rubhpc.integrate.measuring.regimes import N_ALL, N_FIRST, N_MOST
 from rubhpc.integrate.transient import pass_revolutions

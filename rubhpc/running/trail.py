@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.following import n_followed
+from rubhpc.integrate.lyapunov import n_followed
 from rubhpc.integrate.measuring.regimes import LEAST_REVOLUTIONS
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.running.memory import memory

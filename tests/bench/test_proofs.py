@@ -10,7 +10,6 @@ import pytest
 
 import rubhpc
 from rubhpc.integrate import case as integration
-from rubhpc.integrate import closed_form_case
 from rubhpc.study.study import read_study
 
 if TYPE_CHECKING:
@@ -36,12 +35,12 @@ def test_proofs_take_a_quarter_of_a_map_at_most(tmp_path, monkeypatch, capsys):
         assert old in text
         text = text.replace(old, new)
     (tmp_path / "study.toml").write_text(text)
-    solver, integrate = closed_form_case.solver_of, integration._integrate
+    solver, integrate = integration.solver_of, integration._integrate
     proving: list[float] = []
     repeating: list[float] = []
 
     def timed(finds: bool, *case: Any) -> tuple[float, Record]:
-        monkeypatch.setattr(closed_form_case, "solver_of", solver if finds else lambda *_: None)
+        monkeypatch.setattr(integration, "solver_of", solver if finds else lambda *_: None)
         began = time.process_time()
         record = integrate(*case)
         return time.process_time() - began, record

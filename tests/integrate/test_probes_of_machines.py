@@ -13,7 +13,7 @@ from rubhpc.fem.assemble import assemble
 from rubhpc.fem.probes import with_probes
 from rubhpc.integrate.packing import degrees_of, whole_system
 from rubhpc.integrate.reduced_model.reduction import reduce_model
-from rubhpc.integrate.reduced_model.standstill import cutoff_frequency
+from rubhpc.integrate.reduced_model.truncation import cutoff_frequency
 from rubhpc.kernels.contact_pairs import AXIAL, TORSION, V, W
 from rubhpc.rig.parts import Bearing, Damping, Disc, ShaftSection, Torsion
 from rubhpc.rig.rotors import Rotor

@@ -9,9 +9,8 @@ import pytest
 
 from rubhpc import read_rig
 from rubhpc.fem.assemble import assemble
-from rubhpc.integrate import record_variables
-from rubhpc.integrate.measuring.diverged_record import diverged_record
-from rubhpc.integrate.record import Record, State
+from rubhpc.integrate.measuring.divergence import diverged_record
+from rubhpc.integrate.record import Record, RecordVariables, State
 from rubhpc.schema import DIVERGED, VARIABLES
 from rubhpc.study.study import Recording
 
@@ -60,7 +59,7 @@ def test_a_record_lists_its_variables(record):
 
 def test_types_of_variables_are_those_of_the_schema():
     """Editors and type checkers read these; at run time they are no attributes of the class."""
-    tree = ast.parse(inspect.getsource(record_variables))
+    tree = ast.parse(inspect.getsource(RecordVariables))
     typed = {a.target.id: a.annotation.id for a in ast.walk(tree) if isinstance(a, ast.AnnAssign)}
     expected = {
         variable.name: "Floats" if variable.dims else "int" if variable.dtype.startswith("int") else "float"
@@ -68,7 +67,7 @@ def test_types_of_variables_are_those_of_the_schema():
         if variable.role != "state" and variable.name != "status"
     }
     assert typed == expected
-    assert not hasattr(record_variables.RecordVariables, "vertical")
+    assert not hasattr(RecordVariables, "vertical")
 
 
 def test_one_line_says_what_it_holds(record):

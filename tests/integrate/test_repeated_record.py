@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rubhpc import LumpedStator, read_rig, simulate
-from rubhpc.integrate import case, repeated_record
+from rubhpc.integrate import case, marched_record
 from rubhpc.recent import forget
 from rubhpc.rig.reading import with_keys
 from rubhpc.schema import REGIME
@@ -100,13 +100,13 @@ def test_a_record_shorter_than_the_period_is_known_to_be_periodic():
 def test_means_of_a_force_go_on_from_one_period_to_the_next(monkeypatch):
     """Two of three contacts are under way where periods begin: their forces act before, and after."""
     given = {"speed_ratio": 1.7, "clearance_ratio": 0.7, "friction": 0.1, "samples_per_revolution": 2048}
-    note, later = repeated_record._note_peak_at_return, []
+    note, later = marched_record._note_peak_at_return, []
 
     def alone(march, setup, ended, passed):
         later.append(np.zeros_like(ended.peak_force))
         note(march, setup, ended._replace(peak_force=later[-1]), passed)
 
-    monkeypatch.setattr(repeated_record, "_note_peak_at_return", alone)
+    monkeypatch.setattr(marched_record, "_note_peak_at_return", alone)
     rig = with_keys(ring(3), {"rotor.damping.alpha": 20.0})
     found = simulate(rig, transient="direct", revolutions=2, **given)
     before, after = found.contact_force[:, 2047], found.contact_force[:, 2048]
@@ -117,7 +117,7 @@ def test_means_of_a_force_go_on_from_one_period_to_the_next(monkeypatch):
 def test_a_period_that_does_not_close_is_not_repeated(monkeypatch):
     """The case goes on from the motion as a simulation, and its record is judged like any other."""
     closed = simulate("mokhtar2017", transient="direct", revolutions=6, **LIGHT, **TWICE)
-    monkeypatch.setattr(repeated_record, "nothing", lambda _: 0.0)
+    monkeypatch.setattr(marched_record, "nothing", lambda _: 0.0)
     forget()
     marched = simulate("mokhtar2017", transient="direct", revolutions=6, **LIGHT, **TWICE)
     assert (marched.period, marched.settled, REGIME[marched.regime]) == (2, 1, "periodic")

@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from rubhpc.fem.model import Body, Model, StatorModel
-from rubhpc.integrate.central_difference_setup import CentralDifferenceSetup
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.packing import law_of, pack
 from rubhpc.integrate.reduced_model.reduction import reduce_model
 from rubhpc.integrate.scheme import scheme_of
+from rubhpc.integrate.setup import CentralDifferenceSetup
 from rubhpc.study.tables import Integrator
 
 

@@ -23,7 +23,7 @@ from rubhpc import (
 from rubhpc.errors import InputError
 from rubhpc.fem.annular import annular_rub
 from rubhpc.fem.modes import modes
-from rubhpc.integrate.measuring.carried import tip_deflection
+from rubhpc.integrate.measuring.monitors import tip_deflection
 from rubhpc.integrate.measuring.samples import empty_samples, new_accumulator
 from rubhpc.rig.reading import rig_from_dict
 

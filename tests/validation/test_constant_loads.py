@@ -20,9 +20,9 @@ from rubhpc import (
 )
 from rubhpc.fem.assemble import model_at
 from rubhpc.integrate.case import run_case
-from rubhpc.integrate.initial_state import at_rest
 from rubhpc.integrate.record import State
 from rubhpc.integrate.setup import prepare
+from rubhpc.integrate.start import at_rest
 from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.rig.parts import Bearing, ShaftSection
 from rubhpc.rig.reading import with_keys

@@ -106,10 +106,6 @@ class Branching:
         scaled = np.append(point.scale * change, 0.0)
         return np.asarray(scaled / np.linalg.norm(scaled))
 
-    def length_of(self, point: Point, change: Floats) -> float:
-        """Length, in steps, of a change (2 n,) of a motion."""
-        return float(np.linalg.norm(point.scale * change))
-
     def difference(self, a: Point, b: Point) -> Floats:
         """From one point to another in steps: (2 n + 1,), the parameter last."""
         motion = self.family.carry(a.motion, a.case, b.case)

@@ -10,8 +10,7 @@ import numpy as np
 
 from rubhpc.integrate.branches.branch import branch_of
 from rubhpc.integrate.branches.branching import Branching
-from rubhpc.integrate.branches.search import search
-from rubhpc.integrate.branches.start import starts
+from rubhpc.integrate.branches.search import search, starts
 from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.integrate.periodic_motions.family import Family
 from rubhpc.schema import BRANCH_EVENT, DONE, MULTIPLIERS, POINT, branch_variables

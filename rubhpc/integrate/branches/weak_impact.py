@@ -1,17 +1,19 @@
-"""The motion with one additional weak impact, next to a grazing."""
+"""The motion with one additional weak impact, next to a grazing, and the least gap from which it is found."""
 
 from __future__ import annotations
 
 import math
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.branches.least_gap import least_gap
 from rubhpc.integrate.periodic_motions.piecewise_motion import Unfollowed
-from rubhpc.integrate.periodic_motions.revolution import least_of
+from rubhpc.integrate.periodic_motions.revolution import cut, joined, least_of
+from rubhpc.integrate.periodic_motions.saltation import carried
 from rubhpc.integrate.periodic_motions.shooting import NotConverged
+from rubhpc.kernels.mode_change import GAP_TOLERANCE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -20,8 +22,14 @@ if TYPE_CHECKING:
 
     from rubhpc.integrate.branches.branching import Branching
     from rubhpc.integrate.branches.point import Point
+    from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
+    from rubhpc.integrate.periodic_motions.revolution import Piece
 
     Floats = NDArray[np.float64]
+
+
+LOOKS = 256  # samples of a revolution, among which the least gap is sought
+MOST_ITERATIONS, TURNED = 30, 1e-14  # of Newton's method for its time; accuracy as a share of a revolution
 
 NEAR = 1e-8, 1e-2  # of the clearance: gaps from which a gap of zero is extrapolated
 BACK = 1e-3  # of the way to the first motion, where the others are unsuitable
@@ -29,7 +37,109 @@ DEPTH = 1e-5  # of the clearance, by which a motion without the impact would pas
 SMALL = 1e-6  # steps, by which derivatives are taken at most
 ALIKE = 0.1  # of a least gap, between the interpolated and the actual value
 PART = 0.1  # of the gap over the clearance, their upper limit: no gap closes meanwhile
-MOST_ITERATIONS = 20
+MOST_CORRECTIONS = 20
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LeastGap:
+    """The least gap of an open pair where it turns within a period.
+
+    Attributes
+    ----------
+    gap : float, m
+    bend : float, m/s^2
+        Its second derivative with respect to time.
+    """
+
+    point: Point
+    pair: int
+    gap: float
+    bend: float
+    _place: int  # of its piece, counted over all revolutions
+    _time: float  # s, in that piece
+
+    @property
+    def gradient(self) -> Floats:
+        """Derivative (2 n,) of the gap with respect to the motion at the section."""
+        case = self.point.case
+        tables, j = case.mode(self.point.pieces[self._place].states).tables, _switch(case, self.pair)
+        row = tables.switch_re[j] + 1j * tables.switch_im[j]
+        row = row * np.exp((tables.exponent[0] + 1j * tables.exponent[1]) * self._time)
+        gradient: Floats = tables.enter_re @ row.real - tables.enter_im @ row.imag
+        return gradient @ self.point.tangents()[self._place - 1] if self._place else gradient
+
+    def impact(self, depth: float) -> Floats:
+        """Change of the motion (2 n,) after the period by an impact here, to leading order.
+
+        A wall at a depth p is hit with the speed `v = sqrt(2 p d)`, where d is the second derivative of the
+        gap, and the pair parts at once. Closed pairs stay closed.
+        """
+        case, bodies = self.point.case, self.point.case.bodies
+        closed = case.mode(self.point.pieces[self._place].states).is_closed.copy()
+        closed[self.pair] = True
+        hit = np.flatnonzero(closed)
+        speed = np.where(hit == self.pair, np.sqrt(2.0 * max(depth * self.bend, 0.0)), 0.0)
+        gained = (1.0 + bodies.restitution) * speed
+        normals, directions = bodies.gap_jacobian[hit], bodies.force_direction[hit].T
+        change = np.zeros((2 * case.n, 1))
+        change[case.n :, 0] = directions @ np.linalg.solve(normals @ directions, gained)
+        rows = cut(joined([one.rows for one in self.point.revolutions]), self._place, None)
+        times = rows.times.copy()
+        times[0, 1] -= self._time
+        return carried(case, rows._replace(times=times), change)[:, 0]
+
+
+def least_gap(point: Point, pair: int) -> LeastGap | None:
+    """Find the least gap of a pair; None where the gap has no minimum in a piece of the period."""
+    case, best = point.case, (np.inf, 0, 0.0)
+    pieces = point.pieces
+    begins = [point.motion, *(piece.after for piece in pieces)]
+    for place, (piece, begun) in enumerate(zip(pieces, begins, strict=False)):
+        if not case.mode(piece.states).is_open[pair]:
+            continue
+        looks = np.linspace(0.0, piece.duration, max(8, int(LOOKS * piece.duration / case.turn)))
+        gap, rate, _ = _gap(case, piece, begun, pair, looks)
+        is_turn = (rate[:-1] < 0.0) & (rate[1:] >= 0.0)
+        turns = np.flatnonzero(is_turn & (np.minimum(gap[:-1], gap[1:]) > GAP_TOLERANCE))  # none just opened
+        if turns.size:
+            first = turns[np.argmin(np.minimum(gap[turns], gap[turns + 1]))]
+            if (least := min(gap[first], gap[first + 1])) < best[0]:
+                best = float(least), place, float(looks[first if gap[first] == least else first + 1])
+    if not np.isfinite(best[0]):
+        return None
+    _, place, time = best
+    piece, begun = pieces[place], begins[place]
+    for _ in range(MOST_ITERATIONS):
+        gap, rate, bend = _gap(case, piece, begun, pair, np.array([time]))
+        if not bend[0] > 0.0:
+            return None
+        moved = -rate[0] / bend[0]
+        time = float(np.clip(time + moved, 0.0, piece.duration))
+        if abs(moved) < TURNED * case.turn:
+            break
+    return LeastGap(
+        point=point, pair=pair, gap=float(gap[0]), bend=float(bend[0]), _place=place, _time=time
+    )  # fmt: skip
+
+
+def _switch(case: PiecewiseMotion, pair: int) -> int:
+    """Row of the gap of a pair among the switch functions."""
+    return pair * int(case.n_switch // case.q)
+
+
+def _gap(
+    case: PiecewiseMotion, piece: Piece, begun: Floats, pair: int, times: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Gap of a pair and its first and second derivative at some times (k,), s, of a piece."""
+    mode = case.mode(piece.states)
+    tables, j = mode.tables, _switch(case, pair)
+    re, im = case.enter(mode, piece.begin, begun)
+    exponent = tables.exponent[0] + 1j * tables.exponent[1]
+    terms = (re + 1j * im) * np.exp(np.multiply.outer(times, exponent))
+    row = tables.switch_re[j] + 1j * tables.switch_im[j]
+    drift = float(tables.switch_re[j] @ tables.drift)
+    gap, rate, bend = (np.real(terms @ (row * exponent**k)) for k in range(3))
+    return gap + drift * times, rate + drift, bend
 
 
 def weakly_impacting(branching: Branching, free: Sequence[Point], share: float = DEPTH) -> Point:
@@ -79,7 +189,7 @@ def weakly_impacting(branching: Branching, free: Sequence[Point], share: float =
         guesses.append(np.linalg.solve(matrix, np.append(-least.impact(depth), -(least.gap + depth))))
     for guess in guesses[::-1]:
         with suppress(NotConverged):
-            return branching.correct(base, guess, along, most=MOST_ITERATIONS, is_free=True)
+            return branching.correct(base, guess, along, most=MOST_CORRECTIONS, is_free=True)
     raise NotConverged("no motion with a weak impact was found")
 
 

@@ -95,19 +95,23 @@ def record_run_up(
         of_contacts = contact_measures(
             found.together, found.whole, turns, setup.model, is_round=setup.is_updated
         )
-        measures |= (
-            of_contacts
-            | {
-                "contact_fraction": lasts @ found.contact_fraction / lasts.sum(),
-                "peak_contact_force": found.peak_contact_force.max(axis=0),
-                "friction_work": found.friction_work.mean(axis=0),
-                "peak_torsion": float(np.abs(signals["torsion"]).max()),
-                "peak_to_peak_vertical": float(np.ptp(signals["vertical"])),
-                "peak_to_peak_horizontal": float(np.ptp(signals["horizontal"])),
-                **probe_extents(signals),
+        measures |= of_contacts | {
+            "contact_fraction": lasts @ found.contact_fraction / lasts.sum(),
+            "peak_contact_force": found.peak_contact_force.max(axis=0),
+            "friction_work": found.friction_work.mean(axis=0),
+            "peak_torsion": float(np.abs(signals["torsion"]).max()),
+            "peak_to_peak_vertical": float(np.ptp(signals["vertical"])),
+            "peak_to_peak_horizontal": float(np.ptp(signals["horizontal"])),
+            **probe_extents(signals),
+        }
+        if isinstance(found, DrivenRun):
+            measures |= {
+                "energy_residual": found.energy_residual,
+                "revolutions_turned": turns,
+                "record_end": found.end,
+                "last_speed": found.last_speed,
+                "drive_work": float(found.drive_work.sum()),
             }
-            | driven_measures(found)
-        )
     measures |= {
         "modal_error": setup.modal_error,
         "steps": found.n_step,
@@ -121,19 +125,6 @@ def record_run_up(
         remark=found.reason or found.advice,
         status=DIVERGED if found.reason else DONE,
     )
-
-
-def driven_measures(found: RunUp) -> dict[str, float]:
-    """Measures of a driven rotor; none of a run-up."""
-    if not isinstance(found, DrivenRun):
-        return {}
-    return {
-        "energy_residual": found.energy_residual,
-        "revolutions_turned": found.speed.size,
-        "record_end": found.end,
-        "last_speed": found.last_speed,
-        "drive_work": float(found.drive_work.sum()),
-    }
 
 
 def by_revolution(found: RunUp, signals: dict[str, Floats], per_revolution: int) -> dict[str, Floats]:

@@ -24,8 +24,7 @@ import numpy as np
 from rubhpc.errors import InputError
 from rubhpc.integrate.changing_speed.free_piece import DRIVEN_LAG, Spin
 from rubhpc.integrate.changing_speed.run_up import RunUp
-from rubhpc.integrate.changing_speed.sample_times import bring_to_angles
-from rubhpc.integrate.changing_speed.turns import Turns
+from rubhpc.integrate.changing_speed.turns import Turns, bring_to_angles
 from rubhpc.integrate.measuring.measures import LEAST_EXCHANGE
 from rubhpc.integrate.measuring.samples import empty_samples
 from rubhpc.study.speed_law import LONGEST_PIECE, piece_length

@@ -7,8 +7,8 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rubhpc.integrate.changing_speed.last_turn import LastTurn
 from rubhpc.integrate.changing_speed.passing import Passed, Passing, state_at
 from rubhpc.integrate.changing_speed.pieces import Pieces
 from rubhpc.integrate.changing_speed.twist_ramp import TwistRamp, sag_ramp
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.changing_speed.carried_modes import Ended
+    from rubhpc.integrate.changing_speed.passing import Ended
     from rubhpc.integrate.changing_speed.piece_setup import PieceSetup
     from rubhpc.integrate.marches.modal import Place
     from rubhpc.integrate.modal_setup import ModalSetup
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from rubhpc.study.drive_law import DriveLaw
 
     Floats = NDArray[np.float64]
+
 
 DRIVEN_LAG = 0.25 * LAG  # rad, deviation of the shaft's angle; the twist depends on its speed too
 # Rub acts in touches, between which the speed deviates from its mean line. Its share of the torques counts so
@@ -273,3 +274,36 @@ class Spin:
 def _is_uneven(rubbed: float, duration: float, length: int, per_revolution: int) -> bool:
     """Whether a piece is too long for the deceleration by its touches, times `UNEVEN`, rad/s^2."""
     return rubbed * duration**2 > 12.0 * DRIVEN_LAG and SHORTEST * length > per_revolution
+
+
+class LastTurn:
+    """Braking over the last revolution, by the samples in it: rub recurs at the same angle."""
+
+    def __init__(self, per_revolution: int) -> None:
+        """Start without braking."""
+        self._torque, self._rubbed = np.zeros((2, per_revolution))
+
+    def torque(self, at: int, length: int) -> float:
+        """Mean braking torque over so many samples from `at` on, N m."""
+        return _mean(self._torque[self._part(at, length)])
+
+    def rubbed(self, at: int, length: int) -> float:
+        """Friction loss over so many samples from `at` on, J."""
+        return _mean(self._rubbed[self._part(at, length)]) * length
+
+    def note_torque(self, at: int, length: int, torque: float) -> None:
+        """Store the mean braking torque of a piece, N m, also for samples not reached yet."""
+        part = self._part(at, length)
+        self._torque[part.start : None if at < self._torque.size else part.stop] = torque
+
+    def note_rub(self, at: int, length: int, rubbed: float) -> None:
+        """Store the friction loss of a piece, J."""
+        self._rubbed[self._part(at, length)] = rubbed / length
+
+    def _part(self, at: int, length: int) -> slice:
+        first = at % self._torque.size
+        return slice(first, min(first + length, self._torque.size))
+
+
+def _mean(part: NDArray[np.float64]) -> float:
+    return float(part.sum()) / part.size  # `mean` takes three times as long for a few

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.integrate.reduced_model.energy_forms import growth_of
-from rubhpc.kernels.courses import Course, Courses
+from rubhpc.integrate.reduced_model.mode_tables import growth_of
+from rubhpc.kernels.courses import Course, Courses, take_course
 from rubhpc.kernels.filling import ModeCourse
 from rubhpc.kernels.filling_energies import Losses
 
@@ -26,9 +26,11 @@ if TYPE_CHECKING:
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode
     from rubhpc.kernels.contact_modes import ModeTables
 
+
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 Ints = NDArray[np.int64]
+
 A = TypeVar("A", Floats, Complexes)
 
 # Places of the three speeds in the range, and of those where the inverse is exact, the middle first: these
@@ -324,3 +326,127 @@ def most_of(values: Floats | Complexes) -> float:
     """The largest real or imaginary part, without a root for each value."""
     parts = values.view(np.float64)
     return float(max(parts.max(initial=0.0), -parts.min(initial=0.0)))
+
+
+def entries(nodes: Sequence[Node]) -> Entries:
+    """What enters a mode between `NODES`: inverses of its shapes, in the coordinates of those in the middle.
+
+    A mode that stands for a pair has two coordinates here, real and imaginary part, so that all is real but
+    where two real exponents come as a pair.
+    """
+    mode, n_node = nodes[0].mode, len(nodes)
+    m, is_pair = mode.n_eigenmode, weights(mode) > 1.5
+    paired = np.flatnonzero(is_pair)
+    change = np.array([node.mode.motion for node in nodes[1:]]) - mode.motion
+    shares = np.array([shares_of(place, n_node) for place in EXACT])
+    is_moved = (change[..., :m] != 0.0).any(axis=(0, 1))
+    columns = np.flatnonzero(np.append(is_moved, is_moved[paired]))
+    every = _in_parts(mode.enter[:m].T, is_pair, 1.0).T
+    seen = every @ _in_parts(change[..., :m], is_pair, -1.0)[..., columns]
+    # Modes that change, or that others change into: their coordinates, imaginary parts last.
+    is_pushed = np.abs(seen).max(axis=(0, 2), initial=0.0) > LEAST
+    is_moved |= is_pushed[:m]
+    is_moved[paired] |= is_pushed[m:]
+    rows, both = np.flatnonzero(is_moved), np.flatnonzero(np.append(is_moved, is_moved[paired]))
+    mixed = np.zeros((len(change), both.size, both.size), dtype=seen.dtype)
+    mixed[..., np.searchsorted(both, columns)] = seen[:, both]
+    unit = np.eye(both.size)
+
+    def turned(shares: Floats) -> Floats:
+        return np.tensordot(shares, mixed, axes=1) + unit
+
+    back = np.linalg.inv(turned(shares[1:]))
+    through = [unit, *back]
+    judged = np.array([shares_of(place, n_node) for place in JUDGED])
+    lost = max(
+        most_of(between(through, place) @ kept - unit)
+        for place, kept in zip(JUDGED, turned(judged), strict=True)
+    )
+    entered = back @ every[both]
+    found = np.tile(mode.enter[:m], (len(shares), 1, 1))
+    found[1:, rows] = entered[:, : rows.size]
+    found[1:, rows[is_pair[rows]]] += 1j * entered[:, rows.size :]
+    beyond = mode.motion[:, m:] + np.tensordot(shares, change[..., m:], axes=1)
+    for k in range(m, len(mode.enter)):  # coordinates beside the eigenmodes that motion enters
+        if mode.enter[k].any():
+            found[1:] -= (found[1:] @ beyond[1:, :, k - m, np.newaxis]) * mode.enter[k]
+    constants = beyond[..., 1 : 1 + len(mode.take_off) - 2]
+    return Entries(found, (found @ constants).transpose(0, 2, 1), lost)
+
+
+def _in_parts(values: Complexes, is_pair: NDArray[np.bool_], sign: float) -> Floats:
+    """Real parts of values (..., m), and behind them imaginary parts of those of pairs, by a sign.
+
+    Others stay as they are; all is complex where one of them is.
+    """
+    parts = np.concatenate([values.real, sign * values[..., is_pair].imag], axis=-1)
+    single = np.flatnonzero(~is_pair)
+    if values[..., single].imag.any():
+        parts = parts.astype(np.complex128)
+        parts[..., single] = values[..., single]
+    return parts
+
+
+class Eigenmodes(NamedTuple):
+    """The m eigenmodes of a set of closed pairs, which do not depend on the speed."""
+
+    exponent: Complexes  # (m,), 1/s
+    is_pair: NDArray[np.bool_]  # (m,)
+    motion: Complexes  # (2 n, m)
+    enter: Complexes  # (m, 2 n)
+    constant: Complexes  # (c, m), for a unit of each coordinate that does not move
+    drive: Complexes  # (m,), by the unbalance at unit speed
+    mirrored_drive: Complexes  # (m,)
+
+    @classmethod
+    def of(cls, row: ModeTables, course: ModeCourse, within: float) -> Eigenmodes:
+        """Eigenmodes of tables that follow the speed, at a place in the range."""
+        courses, m = course.courses, course.is_pair.size
+        for part in (courses.kept_shape, courses.kept_entry):
+            take_course(part, within, courses.kept)
+        constant = taken(courses.enter_constant, row.enter_constant[0], within)[:, :, :m]
+        motion, enter = (
+            taken(re, re_of[0], within)[:, :m] + 1j * taken(im, im_of[0], within)[:, :m]
+            for re, im, re_of, im_of in (
+                (courses.motion_re, courses.motion_im, row.motion_re, row.motion_im),
+                (courses.enter_re, courses.enter_im, row.enter_re, row.enter_im),
+            )
+        )
+        return cls(
+            exponent=course.exponent[:m].copy(),
+            is_pair=course.is_pair,
+            motion=motion,
+            enter=enter.T,
+            constant=constant[:, 0] + 1j * constant[:, 1],
+            drive=course.drive.copy(),
+            mirrored_drive=course.mirrored_drive.copy(),
+        )
+
+    def entered(
+        self, motion: Floats, constants: Floats, turning: complex, factor: complex, time: float
+    ) -> Complexes:
+        """Coordinates (m,) of a motion (2 n,) at a time, s.
+
+        `turning` (1/s) is the exponent of the unbalance force, `factor` (1/s^2) that of the unbalance at unit
+        speed at time 0.
+        """
+        direct, other = self.forced(turning, factor)
+        turned = np.exp(turning * time)
+        response = direct * turned + other * turned.conj()
+        coordinates: Complexes = self.enter @ motion - constants @ self.constant - response
+        return coordinates
+
+    def forced(self, turning: complex, factor: complex) -> tuple[Complexes, Complexes]:
+        """Response to the unbalance at time 0: parts with `exp(turning t)` and with its conjugate."""
+        direct = self.drive * factor / (turning - self.exponent)
+        mirrored = self.mirrored_drive * factor / (turning - self.exponent.conj())
+        other: Complexes = np.where(self.is_pair, mirrored, direct).conj()
+        return 0.5 * direct, 0.5 * other
+
+    def response(self, turning: complex, factor: complex) -> Complexes:
+        """The same as a motion (2 n,), which turns as `exp(turning t)`: its real part."""
+        direct, other = self.forced(turning, factor)
+        twice = np.where(self.is_pair, 1.0, 2.0) * direct
+        back = np.where(self.is_pair, other.conj(), 0.0)
+        motion: Complexes = self.motion @ twice + self.motion.conj() @ back
+        return motion

@@ -9,26 +9,216 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.integrate.case import march_of
-from rubhpc.integrate.changing_speed.carried_modes import Ended, carried
 from rubhpc.integrate.changing_speed.piece_setup import with_values
 from rubhpc.integrate.changing_speed.range_library import RangeLibrary
-from rubhpc.integrate.changing_speed.stretch import Stretch, begin_stretch, take_stretch
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.marches.modal import ModalMarch, Place
-from rubhpc.integrate.measuring.samples import empty_samples, following_accumulator
+from rubhpc.integrate.measuring.samples import empty_samples, following_accumulator, stacked_accumulators
 from rubhpc.integrate.record import State
-from rubhpc.kernels.accumulators import Accumulator, Samples  # noqa: TC001 - of a NamedTuple
+from rubhpc.kernels.accumulators import Accumulator, Samples
+from rubhpc.kernels.case_progress import FINISHED, MODE_WANTED, PAUSED
+from rubhpc.kernels.pieces import FAST, PIECE, STANDING, TO_BEGIN, Pieces
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.changing_speed.block import Block
+    from rubhpc.integrate.changing_speed.mode_courses import Eigenmodes
     from rubhpc.integrate.changing_speed.piece_setup import PieceSetup
+    from rubhpc.integrate.changing_speed.pieces import Block
+
 
 Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+NEARLY_FAST = 0.8 * FAST  # frequency of a mode over the spin, above which its motion is taken over
+
+
+class Ended(NamedTuple):
+    """End of a piece."""
+
+    setup: PieceSetup
+    library: RangeLibrary
+    left: tuple[int, Floats]  # as of `EventDrivenMarch.reached_in`
+    time: float  # s, since the piece began
+    acceleration: float  # rad/s^2
+
+
+def carried(before: Ended, jump: float, march: EventDrivenMarch, setup: PieceSetup) -> Floats | None:
+    """Coordinates (2, m) of the end of a piece in the modes of the next one; None where they have none.
+
+    Parameters
+    ----------
+    jump : float, rad/s^2
+        Sudden change of the acceleration.
+    march : EventDrivenMarch
+        At the beginning of the next piece.
+    """
+    (mask, z), old, next_ = before.left, before.setup, march.library
+    if mask != march.moved_by(march.mask) or not isinstance(next_, RangeLibrary):
+        return None
+    place = _inside(setup.held.within(old.spin))
+    common = setup.held.reduced.spin + place * setup.held.reach
+    modes = next_.eigenmodes(march.mask, place)
+    known = before.library.eigenmodes(march.mask, _inside(old.held.within(common)))
+    if modes is None or known is None:
+        return None
+    fast = np.flatnonzero(np.abs(known.exponent) > NEARLY_FAST * abs(setup.spin))
+    entered = modes.enter @ (known.motion[:, fast] @ (z[0, fast] + 1j * z[1, fast])).real
+    if jump:
+        entered = entered + _rung(modes, before, jump, setup)
+    found = np.zeros((2, next_.width))
+    found[:, : entered.size] = entered.real, entered.imag
+    return found
+
+
+def _rung(modes: Eigenmodes, before: Ended, jump: float, setup: PieceSetup) -> Complexes:
+    """What a sudden change of the acceleration adds to coordinates (m,) by sag, force and stiffness."""
+    old, n = before.setup, modes.motion.shape[0] // 2
+    turning = complex(old.clock.growth, old.spin)
+    factor, force = complex(old.speeds.factor[old.place]), old.spin**2 - 1j * before.acceleration
+    project = setup.reduced.project[:, : setup.held.lean.size]
+    moved = -jump * np.concatenate([project @ setup.held.lean, project @ setup.held.slope])
+    none = np.zeros(len(modes.constant))
+    found = modes.entered(moved, none, turning, -1j * jump / force * factor, before.time)
+    whirl = modes.response(turning, factor)[:n] * np.exp(turning * before.time)
+    pushed = 0.5 * modes.enter[:, n:] @ (jump * setup.held.momentum)
+    by_whirl = pushed @ whirl / (turning - modes.exponent)
+    found += by_whirl + pushed @ whirl.conj() / (turning.conjugate() - modes.exponent)
+    return found
+
+
+def _inside(place: float) -> float:
+    """The place in a range that is nearest."""
+    return min(max(place, -1.0), 1.0)
+
+
+class Stretch(NamedTuple):
+    """Results of consecutive pieces."""
+
+    n_piece: int
+    whole: Floats  # (n_row, n_sample), about the sag
+    sums: Accumulator  # (n_part, ...), of each revolution, or of each piece where that is less
+    last: Accumulator  # of the last part
+    n_step: int
+    end: Place
+    left: tuple[int, Floats]  # end of the last piece, as in `EventDrivenMarch.reached_in`
+
+
+def begin_stretch(
+    march: EventDrivenMarch,
+    setup: PieceSetup,
+    begun: Place,
+    since: float,
+    left: tuple[int, Floats] | None = None,
+) -> RangeLibrary | None:
+    """Begin a piece, to be continued in the same kernel call; None where it must be integrated alone.
+
+    It has begun either way, but where the march is none that takes several (`has_piece_loop`). `left` is
+    where the piece before has ended (`EventDrivenMarch.reached_in`), of modes that follow the speed, `since`
+    the time from its middle to that of this one, s.
+    """
+    library = march.begin_tuned(setup, begun)
+    if not isinstance(library, RangeLibrary):
+        return None
+    if left is not None and library.follows(march.mask):
+        march.keep_fast(left, setup.spin, since)
+    return None if library.n_room == 1 or library.has_strange(march.met) else library
+
+
+def take_stretch(
+    march: EventDrivenMarch,
+    library: RangeLibrary,
+    block: Block,
+    first: int,
+    samples: Samples,
+    begun: Place,
+    earlier: tuple[Accumulator, float],
+    look: Callable[[int], None],
+) -> Stretch | None:
+    """Integrate the pieces from `first` on, as far as possible; None where that is not possible.
+
+    Parameters
+    ----------
+    march : EventDrivenMarch
+        Whose case it is, at the beginning of the first of them (`begin_stretch`, whose library this is); it
+        stands nowhere afterwards, until it begins again.
+    block : Block
+        Pieces of the same matrices.
+    samples : Samples
+        Room for those of one piece.
+    begun, earlier
+        As in `Passing.take`.
+    """
+    speeds, n_piece, model = block.speeds, min(len(block), library.window_end), block.model
+    n_row, n_sample = samples.whole.shape
+    part = min(n_sample, block.held.template.samples_per_revolution)
+    n_part = n_sample // part
+    q, n = march.bodies.gap_jacobian.shape
+    lasts = n_sample * speeds.interval
+    pieces = Pieces(
+        spin=speeds.spin[:n_piece],
+        growth=speeds.growth[:n_piece],
+        tick=speeds.tick[:n_piece],
+        search_level=block.search_level[:n_piece],
+        force=block.force[:n_piece],
+        since=np.array([earlier[1] if i == first else lasts[i - 1] for i in range(n_piece)]),
+        table=library.filled(march.met),
+        n_room=library.n_room,
+        n_sample=n_sample,
+        n_part_sample=part,
+        energy_limit=block.held.template.energy_limit,
+        at=np.array([first, 0, TO_BEGIN, march.mask]),
+        moved_by=march.moved_by(-1) if library.follows(march.mask) else 0,
+        left=march.reached_in()[1],
+        motion=np.zeros((n_piece + 1, 2 * n)),
+        pressing=np.zeros((n_piece + 1, q)),
+        seen=np.empty((2, 3 + model.n_place)),
+        n_step=np.zeros(n_piece, dtype=np.int64),
+        whole=np.empty((n_row, n_piece * n_sample)),
+    )
+    pieces.motion[first], pieces.pressing[first] = march.begun_motion, begun.contact_force
+    sums = stacked_accumulators(1 + n_piece * n_part, earlier[0])
+    for field, value in zip(sums, earlier[0], strict=True):
+        field[first * n_part] = value
+    seen = march.seen()
+    while True:
+        outcome = march.advance_through(pieces, samples, sums)
+        if outcome not in (MODE_WANTED, PAUSED):
+            break
+        look(int(pieces.at[PIECE]))
+        if outcome == MODE_WANTED:
+            library.reach(int(pieces.at[PIECE]))
+            march.find_wanted()
+            if library.has_strange(march.met):  # from here on piece by piece
+                march.step_back(pieces)
+                break
+            pieces = pieces._replace(table=library.filled(march.met))
+    end = int(pieces.at[PIECE])
+    assert end == n_piece or outcome != FINISHED
+    has_lost = any(
+        march.has_lost_events(
+            int(pieces.n_step[i]), float(lasts[i]), pieces.motion[i + 1], pieces.pressing[i + 1] > 0.0
+        )
+        for i in range(first, end)
+    )
+    if has_lost:  # each is integrated alone
+        pieces.seen[:] = seen
+        march.step_back(pieces)
+    if end == first or has_lost:
+        return None
+    parts = slice(1 + first * n_part, 1 + end * n_part)
+    return Stretch(
+        n_piece=end - first,
+        whole=pieces.whole[:, first * n_sample : end * n_sample],
+        sums=Accumulator._make(field[parts] for field in sums),
+        last=Accumulator._make(field[end * n_part] for field in sums),
+        n_step=int(pieces.n_step.sum()),
+        end=Place(pieces.motion[end].copy(), model.sag, pieces.pressing[end].copy()),
+        left=(march.moved_by(int(pieces.at[STANDING])), pieces.left),
+    )
 
 
 class Passed(NamedTuple):

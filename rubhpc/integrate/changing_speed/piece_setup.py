@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -12,11 +12,8 @@ from rubhpc.fem.probes import probes_at, seen_at_rest
 from rubhpc.fem.statics import at_rest_under
 from rubhpc.integrate.changing_speed.mode_courses import between
 from rubhpc.integrate.changing_speed.range_curved import RangeCurvedLibrary
-from rubhpc.integrate.changing_speed.range_laws import RangeFrictionLibrary, RangePenaltyLibrary
 from rubhpc.integrate.changing_speed.range_library import AT_ONCE, RangeLibrary, TableBuffer
-from rubhpc.integrate.modal_setup import ModalSetup
-from rubhpc.integrate.reduced_model.penalty_mode import Penalty
-from rubhpc.integrate.reduced_model.reduction import directions
+from rubhpc.integrate.modal_setup import Kind, ModalSetup
 from rubhpc.integrate.reduced_model.system_modes import KeptParts
 
 if TYPE_CHECKING:
@@ -25,7 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
+    from rubhpc.integrate.reduced_model.contact_mode import SlidingPairs
     from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs
     from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
@@ -36,7 +33,6 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
 
-R = TypeVar("R", bound=RangeLibrary)
 D = TypeVar("D")
 
 
@@ -77,8 +73,7 @@ class HeldMatrices:
         self.acceleration, self.momentum = acceleration, momentum
         self._phasor, self._reach = phasor, reach
         self._slope = slope  # N m s, of a drive's torque over the speed
-        self._libraries: dict[tuple[str, float], RangeLibrary] = {}
-        self._pairs: dict[float, FrictionPairs] = {}
+        self._libraries: dict[tuple[Kind, float], RangeLibrary] = {}
         self._latest: tuple[tuple[float, ...], Model] | None = None  # by request
         self.first: tuple[tuple[float, ...], object] | None = None  # block of a case, by what was asked
 
@@ -146,18 +141,20 @@ class HeldMatrices:
             self._latest = asked, sagging(self.model, sag, film, rows)
         return self._latest[1]
 
-    def tuned(
-        self, kind: type[R], piece: PieceSetup, friction: float, make: Callable[[], dict[str, Any]]
-    ) -> R:
-        """Contact modes of a friction, tuned to a piece; `make` returns the arguments of the library."""
-        key = kind.__name__, friction
-        if key not in self._libraries:
+    def tuned(self, kind: Kind, piece: PieceSetup, friction: float) -> RangeLibrary:
+        """Contact modes of a friction, tuned to a piece and valid until another one requests them."""
+        self.at_hand = piece.reduced
+        if (kind, friction) not in self._libraries:
             if any(known != friction for _, known in self._libraries):  # of earlier cases
                 self._libraries.clear()
-            self._libraries[key] = kind(
+            made: Callable[..., RangeLibrary] = RangeLibrary
+            if kind == "curved":
+                made = partial(RangeCurvedLibrary, at_piece=lambda: self.at_hand)
+            self._libraries[kind, friction] = made(
                 self.reduced,
                 self.model,
                 friction,
+                pairs=piece.pairs_of_range(kind, friction),
                 phasor=self._phasor,
                 known=self.kept,
                 tick=piece.tick,
@@ -169,18 +166,10 @@ class HeldMatrices:
                 at_place=self.at_place,
                 is_balanced=self.is_balanced,
                 at_once=self.at_once,
-                **make(),
             )
-        library = self._libraries[key]
-        assert isinstance(library, kind)
+        library = self._libraries[kind, friction]
         library.tune(piece.speeds, piece.place)
         return library
-
-    def pairs(self, friction: float, make: Callable[[float], FrictionPairs]) -> FrictionPairs:
-        """The pairs of a friction, with the rims at the speed of some piece."""
-        if friction not in self._pairs:
-            self._pairs[friction] = make(friction)
-        return self._pairs[friction]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -210,11 +199,6 @@ class PieceSetup(ModalSetup):
     def goes_on_in(self, other: PieceSetup, acceleration: float, next_acceleration: float) -> bool:
         """Whether the next piece has matrices of the same range that follow the speed."""
         return other.held is self.held and self.held.is_followed and next_acceleration == acceleration
-
-    @property
-    def n_level(self) -> int:
-        """Levels for which exponentials are tabulated."""
-        return self._n_level
 
     @property
     def _known_of_ring(self) -> Solved:
@@ -250,45 +234,15 @@ class PieceSetup(ModalSetup):
             return made.overlap
         return max(made.overlap, float(self.accuracy * np.abs(clearance[: len(self.model.stators)]).min()))
 
-    def library(self, friction: float) -> ModeLibrary:
-        """Contact modes of a friction, valid until another piece requests them."""
-        return self.held.tuned(RangeLibrary, self, friction, dict)
+    def _find(self, kind: Kind, friction: float) -> ModeLibrary:
+        return self.held.tuned(kind, self, friction)
 
-    def curved_library(self, friction: float) -> CurvedLibrary:
-        """The same with tables for curved gaps."""
+    def pairs_of_range(self, kind: Kind, friction: float) -> SlidingPairs | FrictionPairs:
+        """The pairs of a kind and a friction in the middle of the range."""
         held = self.held
-
-        def at_piece() -> dict[str, Any]:
-            return {"at_piece": lambda: held.at_hand}
-
-        held.at_hand = self.reduced
-        return held.tuned(RangeCurvedLibrary, self, friction, at_piece)
-
-    def penalty_library(self, friction: float) -> ModeLibrary:
-        """The same under a penalty."""
-
-        def penalty() -> dict[str, Any]:
-            gap_jacobian, force_direction, _ = directions(self.held.reduced, self.held.model, friction)
-            law = self.law
-            return {"penalty": Penalty(law.stiffness, law.damping, gap_jacobian, force_direction)}
-
-        return self.held.tuned(RangePenaltyLibrary, self, friction, penalty)
-
-    def friction_pairs(self, friction: float) -> FrictionPairs:
-        """The pairs of a friction."""
-        pairs = self.held.pairs(friction, super().friction_pairs)
-        radius = np.array([stator.radius for stator in self.model.stators])
-        return with_values(pairs, rim_speed=radius * abs(self.spin))
-
-    def friction_library(self, friction: float) -> ModeLibrary:
-        """Contact modes of a friction whose slip may reverse."""
-
-        def pairs() -> dict[str, Any]:
-            radius = np.array([stator.radius for stator in self.model.stators])
-            rim_speed = radius * abs(self.held.reduced.spin)
-            return {"pairs": replace(self.friction_pairs(friction), rim_speed=rim_speed)}
-
-        return self.held.tuned(RangeFrictionLibrary, self, friction, pairs)
+        return with_values(self, reduced=held.reduced, model=held.model, spin=held.reduced.spin)._pairs(
+            kind, friction
+        )
 
 
 def with_values(instance: D, **values: Any) -> D:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rubhpc.integrate.changing_speed.range_library import RangeLibrary
-from rubhpc.integrate.reduced_model.curved_bodies import motion_rows
-from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
-from rubhpc.integrate.reduced_model.curved_tables import (
+from rubhpc.integrate.reduced_model.curved_library import (
+    CurvedLibrary,
     StillParts,
     empty_tables,
+    motion_rows,
     n_tabulated,
     push,
     still_parts,

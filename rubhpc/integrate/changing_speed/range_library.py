@@ -6,56 +6,123 @@ exponentials are made anew for each piece (`kernels.filling`).
 
 from __future__ import annotations
 
+import math
 from copy import copy
+from dataclasses import replace
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rubhpc.integrate.changing_speed.eigenmodes import Eigenmodes
 from rubhpc.integrate.changing_speed.mode_courses import (
     MOST_LOST,
     NODES,
+    Eigenmodes,
     Node,
     constant_course,
+    entries,
     followed,
     matched,
 )
-from rubhpc.integrate.changing_speed.mode_entries import entries
-from rubhpc.integrate.changing_speed.mode_parts import (
-    output_operators,
-    speeds_of,
-    with_slip,
-    without_filled,
-)
-from rubhpc.integrate.reduced_model.energy_forms import energies_of
+from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary, width_without_modes
-from rubhpc.integrate.reduced_model.reduction import directions
+from rubhpc.integrate.reduced_model.mode_tables import energies_of
 from rubhpc.integrate.reduced_model.table_stack import TableStack
 from rubhpc.integrate.reduced_model.touching import OpenBodies, open_bodies
-from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
-from rubhpc.kernels.filling import fill
+from rubhpc.kernels.contact_modes import LANES, SAMPLES_AT_ONCE
+from rubhpc.kernels.contact_pairs import AXIAL, LATERAL
+from rubhpc.kernels.filling import Speeds, fill
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.reduced_model.contact_mode import ContactMode
-    from rubhpc.integrate.reduced_model.energy_forms import Energies
+    from rubhpc.integrate.reduced_model.contact_mode import ContactMode, SlidingPairs
+    from rubhpc.integrate.reduced_model.mode_tables import Energies
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
     from rubhpc.integrate.reduced_model.system_modes import Solved
     from rubhpc.kernels.contact_modes import ModeTables
-    from rubhpc.kernels.filling import ModeCourse, Speeds
+    from rubhpc.kernels.filling import ModeCourse
 
-    Floats = NDArray[np.float64]
-    Complexes = NDArray[np.complex128]
     Ints = NDArray[np.int64]
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
 
 NOT_FILLED = -2  # in place of a set of closed pairs: a contact mode that this piece has not met
 STRUCK = 1e9  # rad/s, speed of the unbalance for which modes are solved
 AT_ONCE = 16  # pieces for whose speeds a contact mode is filled at once
 MOST_BYTES = 2**23  # of its tables for so many pieces; where they are more, it is filled for fewer at once
+
+
+def output_operators(reduced: ReducedModel) -> tuple[Floats, Floats, Floats]:
+    """Rows of tables (`kernels.contact_modes`): of displacements, rates and accelerations, (o, n) each."""
+    none = np.zeros_like(reduced.output)
+    position, rate = [reduced.output, none, none[2:]], [none, reduced.output, none[2:]]
+    acceleration = [none, none, reduced.output[2:]]
+    for place in (*(degree[[AXIAL, LATERAL]] for degree in reduced.degree), *reduced.carrier):
+        position += [place, 0.0 * place[1:]]
+        rate += [0.0 * place, place[1:]]
+        acceleration += [0.0 * place, 0.0 * place[1:]]
+    of_probes = reduced.probe
+    position.append(of_probes[0])
+    rate.append(of_probes[1])
+    acceleration.append(of_probes[2])
+    return np.concatenate(position), np.concatenate(rate), np.concatenate(acceleration)
+
+
+def with_slip(row: ModeTables, slip: Complexes, exponent: Complexes) -> ModeTables:
+    """Tables of a mode, (1, ...), with complete slip speeds (q, coordinates) and their rates."""
+    end, width = exponent.size, row.slip_re.shape[-1]
+    speed = np.zeros((1, len(slip), width), dtype=np.complex128)
+    speed[0, :, :end] = slip
+    rate = speed.copy()
+    rate[0, :, :end] *= exponent
+    return row._replace(
+        slip_re=speed.real.copy(),
+        slip_im=speed.imag.copy(),
+        slip_rate_re=rate.real.copy(),
+        slip_rate_im=rate.imag.copy(),
+    )
+
+
+def without_filled(row: ModeTables, n_row: int) -> ModeTables:
+    """Tables of a mode, (1, ...), without the parts filled in for each speed; they have `n_row` outputs."""
+    width = row.motion_re.shape[-1]
+    n_output = -(-SAMPLES_AT_ONCE * n_row // LANES) * LANES
+    shapes = {"output": (1, 2 * width, n_output)} | {
+        name: getattr(row, name).shape for name in ("power_re", "power_im", "bound")
+    }
+    return row._replace(**{name: np.broadcast_to(0.0, shape) for name, shape in shapes.items()})
+
+
+def speeds_of(
+    spin: ArrayLike,
+    factor: ArrayLike,
+    growth: ArrayLike,
+    tick: ArrayLike,
+    held_spin: float,
+    sample_level: int,
+    reach: float = math.inf,
+) -> Speeds:
+    """Speeds (rad/s) to which tables are filled whose matrices are those at `held_spin`, or within `reach`.
+
+    `factor` (1/s^2) is what the unbalance at unit speed acts by, which grows by `growth` (1/s), `tick` (s)
+    the resolution of events.
+    """
+    spins, ticks = np.asarray(spin, dtype=np.float64), np.asarray(tick, dtype=np.float64)
+    factors = np.asarray(factor, dtype=np.complex128)
+    grown = np.asarray(growth, dtype=np.float64)
+    return Speeds(
+        spin=spins,
+        within=(spins - held_spin) / reach,
+        factor=factors,
+        growth=grown,
+        tick=ticks,
+        interval=ticks * 2.0**sample_level,
+    )
 
 
 class TableBuffer:
@@ -102,6 +169,7 @@ class RangeLibrary(ModeLibrary):
         model: Model,
         friction: float,
         *,
+        pairs: SlidingPairs | FrictionPairs | None = None,
         phasor: Complexes,
         known: Solved,
         tick: float,
@@ -118,7 +186,7 @@ class RangeLibrary(ModeLibrary):
         self.reduced, self._known, self._reach = _struck(reduced, phasor), known, reach
         self._spin = reduced.spin
         self._is_measured, self._at_place, self._at_once = is_balanced, at_place, at_once
-        self.gap_jacobian, self.force_direction, self.slip = directions(reduced, model, friction)
+        self._take_pairs(model, friction, pairs)
         self._tick, self._sample_level, self._n_level = tick, sample_level, n_level
         self._phasor, self._output = phasor, np.hstack(output_operators(reduced))
         self._among: OpenBodies | None = None
@@ -132,7 +200,7 @@ class RangeLibrary(ModeLibrary):
         self._held: dict[int, tuple[ModeTables, ModeCourse]] = {}  # by the set of closed pairs
         self._strange: set[int] = set()  # modes that cannot be followed
         self._counted: tuple[tuple[int, ...], int] = (), 0  # modes, and their memory, bytes
-        kind: tuple[object, ...] = type(self), self.width, n_level, is_balanced
+        kind: tuple[object, ...] = type(self), type(pairs), self.width, n_level, is_balanced
         buffer = TableBuffer(TableStack(1 + len(self.gap_jacobian), self._most_modes))
         self._buffer = buffer if buffers is None else buffers.setdefault(kind, buffer)
         self._tables = self._buffer.tables
@@ -236,8 +304,10 @@ class RangeLibrary(ModeLibrary):
     def eigenmodes(self, mask: int, within: float) -> Eigenmodes | None:
         """Those of a set of closed pairs at a place in the range, from -1 to 1.
 
-        None where a speed changes what enters them otherwise, or it has no room.
+        None where a speed changes what enters them otherwise, as that of rims does, or it has no room.
         """
+        if isinstance(self._pairs, FrictionPairs) and self._pairs.closed(mask):
+            return None
         if mask not in self._held and self.is_full:
             self.forget()
         if not self._has(mask) or mask in self._strange:
@@ -321,34 +391,37 @@ class RangeLibrary(ModeLibrary):
     def _node(self, mode: ContactMode) -> Node:
         """A mode of these matrices, with its tables."""
         row = self._tables_of(mode, self.reduced)
-        n = self.slip.shape[1]
+        n = self.gap_jacobian.shape[1]
         shape, rate = mode.motion[:n], mode.motion[n:]
         resisting = np.zeros((0, mode.exponent.size), dtype=np.complex128)
         if self._is_measured:
-            reduced, friction = self._damped(mode.mask), self._friction_of(mode)
+            reduced, friction = self._pairs.damped(self.reduced, mode.mask), self._friction_of(mode)
             skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
             resisting = reduced.damping @ rate + skew @ shape
             if friction is not None:
                 resisting = resisting - friction
         else:
-            row = with_slip(row, self._slip_rows() @ rate, mode.exponent)
+            row = with_slip(row, self.slip @ rate, mode.exponent)
         return Node.of(mode, row, self._output, resisting)
 
     def _constant(self, node: Node) -> ModeCourse:
         """A mode that stays what it is."""
         mask = node.mode.mask
-        spring, pressed = self._springs(mask) if self._is_measured else (0.0, [])
+        closed, spring = self._pairs.closed(mask), self._pairs.stiffness if self._is_measured else 0.0
+        pressed = closed if spring else []
         return constant_course(
             node,
             self._phasor,
-            n_ahead=1 if self._closed_pairs(mask) else SAMPLES_AT_ONCE,
+            n_ahead=1 if closed else SAMPLES_AT_ONCE,
             spring=spring,
             gap=self.gap_jacobian[pressed],
             clearance=pressed,
         )
 
     def _others(self, beside: Sequence[ReducedModel]) -> list[tuple[ReducedModel, float]]:
-        """Matrices beside those in the middle, and their places in the range."""
+        """Matrices beside those in the middle, or the same with rims at other speeds; places in the range."""
+        if isinstance(self._pairs, FrictionPairs) and not beside:
+            beside = [self.reduced] * (len(NODES) - 1)
         return list(zip(beside, NODES[1:], strict=False))
 
     def _with(self, reduced: ReducedModel, place: float = 0.0) -> Self:
@@ -356,6 +429,9 @@ class RangeLibrary(ModeLibrary):
         other = copy(self)
         other.reduced, other._output = _struck(reduced, self._phasor), np.hstack(output_operators(reduced))
         other._beside, other._is_open = [], False
+        if isinstance(self._pairs, FrictionPairs):  # the speed of the rims goes with that of the shaft
+            share = 1.0 + place * self._reach / self._spin
+            other._pairs = replace(self._pairs, rim_speed=self._pairs.rim_speed * share)
         return other
 
     def _solved(self, mask: int) -> ContactMode:
@@ -366,14 +442,15 @@ class RangeLibrary(ModeLibrary):
 
     def _energies_of(self, mode: ContactMode) -> Energies:
         """Energies of a mode, whose order is not that of open bodies."""
-        found = energies_of(mode, self._damped(mode.mask), self._friction_of(mode), self.width)
+        found = energies_of(
+            mode, self._pairs.damped(self.reduced, mode.mask), self._friction_of(mode), self.width
+        )
         return self._with_springs(found, mode)
-
-    def _spared(self, mode: ContactMode) -> None:
-        """None: outputs are filled in."""
 
     def _width_of(self, model: Model, friction: float) -> int:
         """Width of tables for any mode that is met later."""
+        if isinstance(self._pairs, FrictionPairs):
+            return self._width([self._opened.exponent.size])
         return width_without_modes(self.reduced, model, friction, self._opened.exponent.size)
 
 

@@ -18,8 +18,7 @@ import numpy as np
 from rubhpc.fem.free_spin import unit_rotation
 from rubhpc.integrate.changing_speed.passing import Passing, state_at
 from rubhpc.integrate.changing_speed.pieces import Pieces
-from rubhpc.integrate.changing_speed.sample_times import bring_to_angles
-from rubhpc.integrate.changing_speed.turns import Turns
+from rubhpc.integrate.changing_speed.turns import Turns, bring_to_angles
 from rubhpc.integrate.changing_speed.twist_ramp import moved, sag_ramp
 from rubhpc.integrate.marches.modal import Place
 from rubhpc.integrate.measuring.samples import empty_samples, lift_samples, new_accumulator
@@ -33,7 +32,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.changing_speed.carried_modes import Ended
+    from rubhpc.integrate.changing_speed.passing import Ended
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.kernels.accumulators import Accumulator
     from rubhpc.study.speed_law import SpeedLaw

@@ -13,8 +13,8 @@ from rubhpc.fem.probes import probes_at
 from rubhpc.fem.statics import at_rest_under, sag_under
 from rubhpc.integrate.changing_speed.followed_range import NARROWEST, followed_reach, rotor_of
 from rubhpc.integrate.changing_speed.mode_courses import NODES
-from rubhpc.integrate.changing_speed.mode_parts import speeds_of
 from rubhpc.integrate.changing_speed.piece_setup import HeldMatrices, PieceSetup, sagging
+from rubhpc.integrate.changing_speed.range_library import speeds_of
 from rubhpc.integrate.changing_speed.ripples import Linear
 from rubhpc.integrate.packing import whole_system
 

@@ -1,4 +1,4 @@
-"""Contact measures of a record with a changing speed: for each revolution and for the whole record."""
+"""A record with a changing speed: contact of each revolution and of the whole, samples at fixed angles."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rubhpc.integrate.measuring.carried import carrier_displacement
-from rubhpc.integrate.measuring.monitors import monitored
+from rubhpc.integrate.measuring.monitors import carrier_displacement, monitored
 from rubhpc.integrate.measuring.samples import empty_samples, new_accumulator
+from rubhpc.kernels.resampling import resample
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]
+
 
 _SUMMED = ("n_contact", "contact_time", "impulse", "stick_time")
 MOST_WAITING = 128  # revolutions that are added at once
@@ -100,3 +101,24 @@ def contact_measures(
         "minimum_slip_speed": np.where(np.isfinite(together.least_slip), together.least_slip, np.nan),
         "carrier_displacement": carrier_displacement(samples, model),
     } | monitored(samples, together, model, is_round=is_round)
+
+
+def bring_to_angles(whole: Floats, swing: Floats, cuts: Ints, n_place: int) -> None:
+    """Resample (`Samples.whole`) at the intended angles of the shaft, in place.
+
+    A piece is sampled at even times. At the acceleration a the shaft then lags the even angles by up to
+    `a T^2 / 8`, and reaches them later.
+
+    Contact forces, which are means over the intervals, are not changed.
+
+    Parameters
+    ----------
+    swing : (n_piece,)
+        Change of the speed over each piece, over the sum of its first and its last speed.
+    cuts : (n_piece + 1,)
+        Samples between which the pieces lie.
+    """
+    if swing.any():
+        first_force = 4 + 2 * n_place
+        resample(whole[:first_force], swing, cuts)
+        resample(whole[first_force + n_place :], swing, cuts)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.central_difference_setup import CentralDifferenceSetup
+    from rubhpc.integrate.setup import CentralDifferenceSetup
     from rubhpc.kernels.accumulators import Accumulator, Samples
     from rubhpc.kernels.contact_pairs import Pairs, Workspace
 

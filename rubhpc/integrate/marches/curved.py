@@ -10,8 +10,7 @@ from rubhpc.errors import InputError
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.marches.march import NO_FORCES
 from rubhpc.integrate.marches.met_modes import NoClosedForm
-from rubhpc.integrate.reduced_model.curved_bodies import curved_pairs, followed_pairs
-from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
+from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary, curved_pairs, followed_pairs
 from rubhpc.kernels.case_progress import ask_for, begin_in
 from rubhpc.kernels.curved_contact import KEPT, curved_work
 from rubhpc.kernels.curved_loop import advance_curved

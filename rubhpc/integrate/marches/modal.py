@@ -14,7 +14,7 @@ from rubhpc.fem.statics import sag_at_stators
 from rubhpc.integrate.marches.march import ALL_SAMPLES, March
 from rubhpc.integrate.measuring.divergence import displacement_reason, energy_reason
 from rubhpc.integrate.record import State
-from rubhpc.integrate.reduced_model.array_room import aligned
+from rubhpc.integrate.reduced_model.table_stack import aligned
 from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
     DIVERGED,

@@ -9,8 +9,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.integrate.measuring.orbit_measures import LONGEST_PERIOD, PERIOD_TOLERANCE
-from rubhpc.integrate.measuring.recorded_orbit import RecordedOrbit, is_torus
+from rubhpc.integrate.measuring.orbit_measures import (
+    LONGEST_PERIOD,
+    PERIOD_TOLERANCE,
+    RecordedOrbit,
+    is_torus,
+)
 from rubhpc.schema import REGIME
 
 if TYPE_CHECKING:

@@ -16,10 +16,8 @@ from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.packing import law_of
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion, Unfollowed
 from rubhpc.integrate.record import State
-from rubhpc.integrate.reduced_model.along_speeds import AlongSpeeds
-from rubhpc.integrate.reduced_model.reduction import reduce_to
-from rubhpc.integrate.reduced_model.standstill import at_standstill, completed
-from rubhpc.integrate.reduced_model.truncation import Touch, kept_modes, touch_of
+from rubhpc.integrate.reduced_model.reduction import AlongSpeeds, reduce_to
+from rubhpc.integrate.reduced_model.truncation import Touch, at_standstill, completed, kept_modes, touch_of
 from rubhpc.integrate.scheme import Scheme
 from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import with_keys

@@ -73,7 +73,7 @@ class PiecewiseMotion:
     Parameters
     ----------
     initial : State or None
-        Where the case begins; `integrate.initial_state.fit_to_gaps` makes it fit. None: where a march stands.
+        Where the case begins; `integrate.start.fit_to_gaps` makes it fit. None: where a march stands.
     march : EventDrivenMarch, optional
         Of the case, that is needed no more: it is started anew, unless it stands where the case begins.
     """

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.following import count_followed
+from rubhpc.integrate.lyapunov import count_followed
 from rubhpc.integrate.marches.closed_form import closed_form_march
 from rubhpc.integrate.marches.met_modes import NoClosedForm
-from rubhpc.integrate.measuring.orbit_measures import PERIOD_TOLERANCE
-from rubhpc.integrate.measuring.recorded_orbit import closest_return
+from rubhpc.integrate.measuring.orbit_measures import PERIOD_TOLERANCE, closest_return
 from rubhpc.integrate.measuring.regimes import MOST_DOUBLED, MOST_EVENTS, Solution
 from rubhpc.integrate.packing import output_degrees
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion

@@ -12,9 +12,9 @@ from rubhpc.integrate.reduced_model.contact_mode import (
     Places,
     confine,
     confined_modes,
+    damped,
     steady_response,
 )
-from rubhpc.integrate.reduced_model.penalty_mode import damped
 from rubhpc.integrate.reduced_model.products import expanded, real_times
 from rubhpc.integrate.reduced_model.secular_modes import Contact
 from rubhpc.kernels.friction_states import BACKWARD, OPEN, STUCK, lifted_place
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.reduced_model.closings import Within
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
+    from rubhpc.integrate.reduced_model.secular_modes import Within
     from rubhpc.integrate.reduced_model.system_modes import Solved
 
     Floats = NDArray[np.float64]
@@ -72,20 +72,6 @@ class FrictionMode(ContactMode):
         growth[columns] = self.growth
         return {"n_mode": m, "growth": growth}
 
-    def friction_forces(self, pairs: FrictionPairs) -> Complexes:
-        """Friction forces on the motion with each coordinate, (n, m + 2 + 2 q), N."""
-        closed = pairs.closed(self.mask)
-        traction = np.zeros((len(closed), self.exponent.size), dtype=np.complex128)
-        states = states_of(self.mask, len(pairs.gap_jacobian))
-        for along, i in zip(traction, closed, strict=True):
-            first, second = self.switch[2 * i], self.switch[2 * i + 1]
-            if states[i] == STUCK:
-                along[:] = 0.5 * (second - first)
-            else:
-                along[:] = (-pairs.friction if states[i] == BACKWARD else pairs.friction) * first
-        forces: Complexes = pairs.friction_direction[closed].T @ traction
-        return forces
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FrictionPairs:
@@ -105,7 +91,23 @@ class FrictionPairs:
 
     def damped(self, reduced: ReducedModel, mask: int) -> ReducedModel:
         """The model with the penalty's dampers of the closed pairs."""
-        return damped(reduced, self.damping, self.gap_jacobian[self.closed(mask)])
+        return (
+            damped(reduced, self.damping, self.gap_jacobian[self.closed(mask)]) if self.stiffness else reduced
+        )
+
+    def friction_forces(self, mode: ContactMode) -> Complexes:
+        """Friction forces on the motion with each coordinate of a mode, (n, m + 2 + 2 q), N."""
+        closed = self.closed(mode.mask)
+        traction = np.zeros((len(closed), mode.exponent.size), dtype=np.complex128)
+        states = states_of(mode.mask, len(self.gap_jacobian))
+        for along, i in zip(traction, closed, strict=True):
+            first, second = mode.switch[2 * i], mode.switch[2 * i + 1]
+            if states[i] == STUCK:
+                along[:] = 0.5 * (second - first)
+            else:
+                along[:] = (-self.friction if states[i] == BACKWARD else self.friction) * first
+        forces: Complexes = self.friction_direction[closed].T @ traction
+        return forces
 
 
 def states_of(mask: int, q: int) -> list[int]:
@@ -132,7 +134,7 @@ def solve_friction_mode(
     equations on L, `L^T B = 0`, removes the forces. B are their directions: the normal force of a sliding
     pair includes its friction, that of a sticking pair does not. Under a penalty gaps are not constraints:
     `k P Q` and `c P Q` are added to the matrices, and `-k P` is the load of the clearances, as in
-    `penalty_mode`. `opened` are the bodies with every pair open.
+    `pressed_mode`. `opened` are the bodies with every pair open.
     """
     n, q = reduced.stiffness.shape[0], len(pairs.gap_jacobian)
     states = np.array(states_of(mask, q))

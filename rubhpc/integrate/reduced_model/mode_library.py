@@ -4,24 +4,28 @@ from __future__ import annotations
 
 import weakref
 from copy import copy
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rubhpc.integrate.reduced_model.contact_mode import ContactMode, count_coordinates
-from rubhpc.integrate.reduced_model.energy_forms import energies_of
-from rubhpc.integrate.reduced_model.mode_tables import Spared, bytes_ahead, mode_of, tabulate
-from rubhpc.integrate.reduced_model.penalty_mode import stored_energy
+from rubhpc.integrate.reduced_model.contact_mode import (
+    ContactMode,
+    SlidingPairs,
+    count_coordinates,
+    stored_energy,
+)
+from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs
+from rubhpc.integrate.reduced_model.mode_tables import bytes_ahead, energies_of, mode_of, tabulate
 from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions
 from rubhpc.integrate.reduced_model.table_stack import MOST_BYTES, MOST_MODES, TableStack
-from rubhpc.integrate.reduced_model.touching import contact_mode_among, open_bodies
+from rubhpc.integrate.reduced_model.touching import mode_among, open_bodies
 from rubhpc.kernels.contact_modes import LANES, SAMPLES_AT_ONCE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.reduced_model.energy_forms import Energies
+    from rubhpc.integrate.reduced_model.mode_tables import Energies
     from rubhpc.integrate.reduced_model.system_modes import Solved
     from rubhpc.integrate.reduced_model.touching import OpenBodies
     from rubhpc.kernels import contact_modes as kernel
@@ -36,23 +40,14 @@ FEW_PAIRS = 5  # with outputs that take little memory
 VACANT = -3  # instead of a set of closed contacts: a discarded mode
 
 
-class Shared(TypedDict, total=False):
-    """Arguments of a library other than bodies and law; see `ModeLibrary`."""
-
-    opened: Any
-    known: Solved
-    tick: float
-    sample_level: int
-    n_level: int
-    is_measured: bool
-    among: OpenBodies | None
-
-
 class ModeLibrary:
     """Contact modes of one speed and friction, solved when first met and shared by all cases.
 
     Parameters
     ----------
+    pairs : SlidingPairs or FrictionPairs, optional
+        By default those of steady sliding, whose gaps are constraints while closed. Masks have a bit for each
+        pair, under a penalty a further one for lifted pairs; with stick there are two bits for each state.
     opened : ContactMode
         The mode with every pair open, which does not depend on friction.
     known : Solved
@@ -73,6 +68,7 @@ class ModeLibrary:
         model: Model,
         friction: float,
         *,
+        pairs: SlidingPairs | FrictionPairs | None = None,
         opened: ContactMode,
         known: Solved,
         tick: float,
@@ -83,14 +79,14 @@ class ModeLibrary:
     ) -> None:
         """Start with every pair open; of one pair also with it closed."""
         self.reduced = reduced
-        self.gap_jacobian, self.force_direction, self.slip = directions(reduced, model, friction)
+        self._take_pairs(model, friction, pairs)
         self._tick, self._sample_level = tick, sample_level
         self._n_level = self._n_level_followed = n_level
         self._is_measured = is_measured
         self._opened, self._known = opened, known
         q = len(self.gap_jacobian)
         self._among = open_bodies(reduced, model, opened) if among is None else among
-        self.first_masks = [0] if q > 1 else [0, self._closed]
+        self.first_masks = [0] if q > 1 else [0, 1]
         modes = [self._solved(mask) for mask in self.first_masks]
         self.width = self._width([mode.exponent.size for mode in modes])
         may_be_large, ahead = self._is_measured and self._is_parted, (self._n_ahead, n_level)
@@ -231,60 +227,48 @@ class ModeLibrary:
     _n_ahead = SAMPLES_AT_ONCE
     _chance: np.random.Generator | None = None
     _most_modes = MOST_MODES
-    _closed = 1  # set of one pair that is closed
     _is_measured = True
+
+    def _take_pairs(self, model: Model, friction: float, pairs: SlidingPairs | FrictionPairs | None) -> None:
+        self.gap_jacobian, self.force_direction, self.slip = directions(self.reduced, model, friction)
+        self._pairs = pairs or SlidingPairs(self.gap_jacobian, self.force_direction)
+        if isinstance(pairs, FrictionPairs):  # whose switch functions contain the slip
+            self.slip = self.slip[:0]
 
     def _width(self, sizes: list[int]) -> int:
         """Width of tables for modes of these sizes and any set that is met later."""
-        return padded_width(max(sizes), len(self.gap_jacobian))
+        has_stick = isinstance(self._pairs, FrictionPairs)
+        return padded_width(max(sizes), len(self.gap_jacobian), has_stick=has_stick)
 
     def _solved(self, mask: int) -> ContactMode:
         return self._opened if mask == 0 else self._solve(mask)
 
     def _solve(self, mask: int) -> ContactMode:
         """The mode of a set of states."""
-        directions = self.gap_jacobian, self.force_direction
-        return contact_mode_among(self._among, self.reduced, directions, mask, self._known)
-
-    def _closed_pairs(self, mask: int) -> list[int]:
-        """Closed pairs of a set."""
-        return [i for i in range(len(self.gap_jacobian)) if mask >> i & 1]
-
-    def _damped(self, mask: int) -> ReducedModel:
-        """The bodies with the dampers that a law adds in a set of states."""
-        return self.reduced
-
-    def _springs(self, mask: int) -> tuple[float, list[int]]:
-        """Stiffness of the springs of a law, N/m, and pairs that press them."""
-        return 0.0, []
+        opened = self._opened if mask else None
+        return mode_among(self._among, self.reduced, self._pairs, opened, mask, self._known)
 
     def _energies_of(self, mode: ContactMode) -> Energies:
         """Energies of a mode."""
-        friction, reduced = self._friction_of(mode), self._damped(mode.mask)
+        friction, reduced = self._friction_of(mode), self._pairs.damped(self.reduced, mode.mask)
         if self._among is None:
             found = energies_of(mode, reduced, friction, self.width)
         else:
-            closed = self._closed_pairs(mode.mask)
+            closed = self._pairs.closed(mode.mask)
             found = self._among.energies(mode, reduced, friction, closed, self.width)
         return self._with_springs(found, mode)
 
     def _with_springs(self, energies: Energies, mode: ContactMode) -> Energies:
         """Energies of a mode with those of the springs of a law."""
-        stiffness, pressed = self._springs(mode.mask)
-        if not pressed:
+        stiffness, pressed = self._pairs.stiffness, self._pairs.closed(mode.mask)
+        if not (stiffness and pressed):
             return energies
         stored = stored_energy(stiffness, self.gap_jacobian, pressed, mode, self.width)
         return energies._replace(loss=energies.loss + stored)
 
-    def _slip_rows(self) -> Floats:
-        """Slip speed of each pair with the motion, unless the switch functions contain it."""
-        return self.slip
-
     def _friction_of(self, mode: ContactMode) -> Complexes | None:
         """Friction forces on the motion with each coordinate of a mode (n, m), N; None: omitted."""
-        closed = self._closed_pairs(mode.mask)
-        friction: Complexes = (self.force_direction - self.gap_jacobian)[closed].T @ mode.switch[closed]
-        return friction
+        return self._pairs.friction_forces(mode)
 
     def _tabulate(self, mode: ContactMode, row: kernel.ModeTables | None = None) -> None:
         """Add a mode, with its tables if they are known."""
@@ -298,10 +282,10 @@ class ModeLibrary:
 
     def _tables_of(self, mode: ContactMode, reduced: ReducedModel) -> kernel.ModeTables:
         """Tables of one mode."""
-        tables = tabulate(
+        return tabulate(
             mode,
             reduced,
-            self._slip_rows(),
+            self.slip,
             energies=self._energies_of(mode) if self._is_measured else None,
             width=self.width,
             tick=self._tick,
@@ -309,27 +293,15 @@ class ModeLibrary:
             n_level=self._n_level,
             is_measured=self._is_measured,
             n_ahead=self._n_ahead,
-            spared=self._spared(mode) if self._is_measured else None,
         )
-        if mode.mask == 0:
-            self._open_output = tables.output[0]
-        return tables
-
-    def _spared(self, mode: ContactMode) -> Spared | None:
-        """Outputs of the open set that a mode shares."""
-        closed = self._closed_pairs(mode.mask)
-        touching = self._among.touching(closed) if self._among and closed and self._n_ahead else None
-        if touching is None:
-            return None
-        return Spared(mode.n_eigenmode - touching.spared.size, touching.spared, self._open_output)
 
 
-def padded_width(widest: int, q: int) -> int:
+def padded_width(widest: int, q: int, *, has_stick: bool = False) -> int:
     """Width of tables for modes of q pairs up to this size; for several pairs the size of the open mode.
 
     Closing a gap removes a degree of freedom. It adds a coordinate only where a vibration becomes two decays.
     """
-    return -(-(widest + (SPARE if q > 1 else 0)) // LANES) * LANES
+    return -(-(widest + (SPARE if q > 1 or has_stick else 0)) // LANES) * LANES
 
 
 def width_without_modes(reduced: ReducedModel, model: Model, friction: float, n_open: int) -> int:

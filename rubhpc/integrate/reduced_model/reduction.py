@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rubhpc.integrate.packing import carrier_degrees, degrees_of, output_degrees, whole_system
 from rubhpc.integrate.reduced_model.coupling import Grouped, coupled_rows
-from rubhpc.integrate.reduced_model.standstill import Modes, at_standstill, parted, seen_degrees
-from rubhpc.integrate.reduced_model.truncation import SMOOTH, kept_modes
+from rubhpc.integrate.reduced_model.truncation import (
+    SMOOTH,
+    Modes,
+    at_standstill,
+    completed,
+    kept_modes,
+    parted,
+    seen_degrees,
+)
 from rubhpc.kernels._jit import plain
 from rubhpc.kernels.contact_modes import Reduced
 from rubhpc.kernels.contact_pairs import LATERAL, N_DEGREE, TORSION, V, W, rim_sense
 from rubhpc.kernels.mode_change import GAP_TOLERANCE
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from numpy.typing import NDArray
 
@@ -30,6 +38,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]
     Bools = NDArray[np.bool_]
+
 
 # Limit of omitted static responses to dampers, relative to the damped mode, times sqrt(accuracy): the error
 # of the mode's exponent is its square.
@@ -304,3 +313,49 @@ def directions(reduced: ReducedModel, model: Model, friction: float) -> tuple[Fl
     along = lateral + ez * v - ey * w - radius[:, None] * torsion
     sense = plain(rim_sense)(reduced.spin)
     return gap_jacobian, gap_jacobian + sense * friction * along, -sense * along
+
+
+class AlongSpeeds:
+    """Reduces a model once for a range of speeds, so that all speeds share one basis.
+
+    The basis has the modes that any of the given speeds needs. Gyroscopic terms are proportional to the
+    speed, unbalance forces to its square. Nothing else changes, unless bearings do.
+
+    Parameters
+    ----------
+    spins : iterable of float, rad/s
+        Speeds of the range, its ends above all.
+    accuracy : float
+    touch : Touch
+        As of `reduce_model`.
+    """
+
+    def __init__(self, model: Model, spins: Iterable[float], accuracy: float, touch: Touch = SMOOTH) -> None:
+        """Choose the basis, and project on it."""
+        spins = sorted(spins, key=abs)
+        choices = zip(*(kept_modes(model, spin, accuracy, touch) for spin in spins), strict=True)
+        parts = at_standstill(model).parts
+        are_kept = [
+            completed(part, reduce(np.logical_or, of)) for part, of in zip(parts, choices, strict=True)
+        ]
+        self._fastest = reduce_to(model, spins[-1], accuracy, are_kept)
+        basis = self._fastest.basis
+        for name in ("project", "translations"):  # found once, for `at` to copy
+            getattr(self._fastest, name)
+        _, still, _, _ = whole_system(model, 0.0)
+        _, _, _, force = whole_system(model, 1.0)
+        self._damping = basis.T @ still @ basis
+        gyroscopic = np.zeros_like(still)
+        first = 0
+        for body in model.bodies:
+            rows = slice(first, first + body.n_dof)
+            gyroscopic[rows, rows] = body.gyroscopic
+            first += body.n_dof
+        self._gyroscopic, self._force = basis.T @ gyroscopic @ basis, force @ basis
+
+    def at(self, spin: float) -> ReducedModel:
+        """The model at a speed, rad/s."""
+        found = copy(self._fastest)  # including its cached projections
+        damping, force = self._damping + spin * self._gyroscopic, spin**2 * self._force
+        vars(found).update(spin=spin, damping=damping, force=force)
+        return found

@@ -8,10 +8,12 @@ from hashlib import blake2b
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg import matrix_balance
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 from rubhpc.errors import InputError
 from rubhpc.integrate.reduced_model.coupling import coupled_rows
-from rubhpc.integrate.reduced_model.repeated_exponents import real_ones, separate
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -20,9 +22,70 @@ if TYPE_CHECKING:
     Complexes = NDArray[np.complex128]
     Solved = dict[bytes, tuple[Complexes, Complexes, Complexes]]  # parts, by their names (`_name_of`)
 
+
+ROUNDING = 100 * np.finfo(np.float64).eps  # difference of two equal exponents, over the norm of the system
+LEAST_SPREAD = 1e-7  # of eigenvectors of one exponent, least singular value over the greatest
+WORST_BALANCED = 1e7  # condition of all eigenvectors; for a defective system about 1e8
+REAL = 1e-12  # imaginary part of a real exponent, over the greatest
+
 WORST_CONDITION = 1e11  # of the eigenvectors; above it their sums lose digits, and they are separated
 SMALL = 64  # states of a part that is kept
 MOST_BYTES = 2**29  # of parts that are kept
+
+
+def separate(system: Floats) -> tuple[Complexes, Complexes, Complexes] | None:
+    """Exponents, shapes and inverse shapes of a first-order system with repeated exponents.
+
+    Many identical stators on one carrier have such. A general eigensolver returns all eigenvectors of a
+    repeated exponent, but rounding determines their directions: two may nearly coincide. They are replaced by
+    an orthonormal basis of their span, in coordinates in which displacements and rates have equal size.
+
+    Parameters
+    ----------
+    system : (n, n)
+
+    Returns
+    -------
+    exponent : (n,)
+        1/s; those that differ only by rounding are made equal.
+    shape, inverse : (n, n)
+        Shapes as columns, and the inverse of that matrix. The result is None where shapes coincide, as in
+        critical damping.
+    """
+    with np.errstate(invalid="ignore"):  # in the permutation that it also makes of the scale
+        balanced, (scale, _) = matrix_balance(system, permute=False, separate=True)
+    exponent, shape = (values.astype(np.complex128) for values in np.linalg.eig(balanced))
+    is_real = real_ones(exponent)
+    for group in _equal(exponent, ROUNDING * float(np.linalg.norm(balanced, 2))):
+        if not (is_real[group].all() or np.all(exponent[group].imag > 0.0)):
+            continue  # the lower half of conjugate pairs follows the upper
+        real = bool(is_real[group].all())
+        vectors = np.hstack([shape[:, group].real, shape[:, group].imag]) if real else shape[:, group]
+        directions, size, _ = np.linalg.svd(vectors, full_matrices=False)
+        if size[group.size - 1] < LEAST_SPREAD * size[0]:
+            return None
+        middle = exponent[group].mean()
+        exponent[group] = middle.real if real else middle
+        shape[:, group] = directions[:, : group.size]
+        if not real:  # the solver places a conjugate after its partner
+            exponent[group + 1], shape[:, group + 1] = exponent[group].conj(), shape[:, group].conj()
+    if not np.linalg.cond(shape) < WORST_BALANCED:
+        return None
+    return exponent, scale[:, None] * shape, np.linalg.inv(shape) / scale
+
+
+def real_ones(exponent: Complexes) -> NDArray[np.bool_]:
+    """Which exponents are real up to rounding."""
+    is_real: NDArray[np.bool_] = np.abs(exponent.imag) <= REAL * np.abs(exponent).max()
+    return is_real
+
+
+def _equal(exponent: Complexes, tolerance: float) -> list[NDArray[np.int64]]:
+    """Places of each group of repeated exponents."""
+    near = np.abs(exponent[:, None] - exponent) <= tolerance
+    _, group = connected_components(csr_array(near), directed=False)
+    places = (np.flatnonzero(group == number) for number in np.unique(group))
+    return [at for at in places if at.size > 1]
 
 
 class KeptParts(dict[bytes, "tuple[Complexes, Complexes, Complexes]"]):
@@ -57,7 +120,7 @@ def modes_of(system: Floats, known: Solved | None = None) -> tuple[Complexes, Co
     exponents: list[Complexes] = [np.zeros(0, dtype=np.complex128)]  # a mass on a rigid wall has no modes
     shapes: list[Complexes] = [np.zeros((n_state, 0), dtype=np.complex128)]
     inverses: list[Complexes] = [np.zeros((0, n_state), dtype=np.complex128)]
-    for rows in _parts(system):
+    for rows in coupled_rows(system != 0.0):
         part = system[np.ix_(rows, rows)]
         name = _name_of(part) if known else b""
         solved = known.get(name) if known else None
@@ -121,7 +184,7 @@ def _inverse(shape: Complexes, worst: float) -> Complexes | None:
 
 def solve_parts(system: Floats) -> Solved:
     """All parts of a system, solved, for `modes_of`."""
-    parts = (system[np.ix_(rows, rows)] for rows in _parts(system))
+    parts = (system[np.ix_(rows, rows)] for rows in coupled_rows(system != 0.0))
     return {name: solve_part(part) for name, part in {_name_of(part): part for part in parts}.items()}
 
 
@@ -133,23 +196,12 @@ def _name_of(part: Floats) -> bytes:
 
 def parts_of(system: Floats, q: int) -> list[NDArray[np.int64]]:
     """Rows of each uncoupled part; all rows for one pair, where separation saves little."""
-    return _parts(system) if q > 1 else [np.arange(len(system))]
-
-
-def _parts(system: Floats) -> list[NDArray[np.int64]]:
-    """Rows of each uncoupled part of a system."""
-    return _rows_of_parts((system != 0.0).tobytes(), len(system))
-
-
-@lru_cache(maxsize=32)
-def _rows_of_parts(linked: bytes, n: int) -> list[NDArray[np.int64]]:
-    """The same from the nonzero pattern (n, n)."""
-    return coupled_rows(np.frombuffer(linked, dtype=bool).reshape(n, n))
+    return coupled_rows(system != 0.0) if q > 1 else [np.arange(len(system))]
 
 
 def count_modes(system: Floats) -> int:
     """Count the eigenmodes of a system, one of each conjugate pair."""
-    exponents = (np.linalg.eigvals(system[np.ix_(rows, rows)]) for rows in _parts(system))
+    exponents = (np.linalg.eigvals(system[np.ix_(rows, rows)]) for rows in coupled_rows(system != 0.0))
     return sum(int(np.count_nonzero(_kept(exponent.astype(np.complex128))[1])) for exponent in exponents)
 
 

@@ -10,34 +10,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.integrate.reduced_model import reduction
-from rubhpc.integrate.reduced_model.closings import Closings, Within
-from rubhpc.integrate.reduced_model.contact_mode import solve_contact_mode
+from rubhpc.integrate.reduced_model.contact_mode import (
+    pressed_mode,
+    solve_contact_mode,
+    solve_penalty_mode,
+    watched,
+)
 from rubhpc.integrate.reduced_model.coupling import coupled_rows
-from rubhpc.integrate.reduced_model.energy_forms import (
+from rubhpc.integrate.reduced_model.friction_mode import (
+    FrictionMode,
+    FrictionPairs,
+    mask_of,
+    solve_friction_mode,
+    states_of,
+    watch_open_pairs,
+)
+from rubhpc.integrate.reduced_model.mode_tables import (
     Energies,
     Growth,
     energies_of,
     energy_forms,
     growth_of,
 )
-from rubhpc.integrate.reduced_model.friction_mode import (
-    FrictionMode,
-    mask_of,
-    solve_friction_mode,
-    states_of,
-    watch_open_pairs,
-)
-from rubhpc.integrate.reduced_model.penalty_mode import pressed_mode, solve_penalty_mode, watched
 from rubhpc.integrate.reduced_model.products import real_times
-from rubhpc.integrate.reduced_model.secular_modes import Eigenmodes
+from rubhpc.integrate.reduced_model.secular_modes import Closings, Eigenmodes, Within
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.reduced_model.contact_mode import ContactMode
-    from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs
-    from rubhpc.integrate.reduced_model.penalty_mode import Penalty
+    from rubhpc.integrate.reduced_model.contact_mode import ContactMode, SlidingPairs
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
     from rubhpc.integrate.reduced_model.system_modes import Solved
 
@@ -208,73 +210,51 @@ class OpenBodies:
         return found
 
 
-def contact_mode_among(
+def mode_among(
     among: OpenBodies | None,
     reduced: ReducedModel,
-    directions: tuple[Floats, Floats],
+    pairs: SlidingPairs | FrictionPairs,
+    opened: ContactMode | None,
     mask: int,
     known: Solved | None,
 ) -> ContactMode:
-    """The contact mode of `solve_contact_mode`; `directions` are gap Jacobian and forces."""
-    gap_jacobian, force = directions
-    q, n = gap_jacobian.shape
-    closed = [i for i in range(q) if mask >> i & 1]
-    touching = among.touching(closed) if among and closed else None
-    if among is None or touching is None:
-        return solve_contact_mode(
-            reduced, gap_jacobian, force, mask, known, among.within() if among else None
-        )
-    rates, forces = touching.of_pairs(gap_jacobian), touching.of_pairs(force)
-    every, own_open = (1 << len(closed)) - 1, among.within(touching.rows)
-    own = solve_contact_mode(touching.model(reduced), rates, forces, every, known, own_open)
-    mode = replace(touching.among_all(own, among.opened, n, q), mask=mask)
-    watched_pairs = np.setdiff1d(np.arange(q), closed)
-    mode.switch[watched_pairs] = real_times(gap_jacobian[watched_pairs], mode.motion[:n])
-    mode.switch[watched_pairs, mode.n_eigenmode + 1 + watched_pairs] += 1.0
-    return mode
+    """The contact mode of a set of states, solved for the bodies that touch where there are others.
 
-
-def penalty_mode_among(
-    among: OpenBodies | None,
-    reduced: ReducedModel,
-    penalty: Penalty,
-    opened: ContactMode,
-    mask: int,
-    known: Solved | None,
-) -> ContactMode:
-    """The contact mode of `solve_penalty_mode`."""
-    pressed, (q, n) = penalty.pressed(mask), penalty.gap_jacobian.shape
-    touching = among.touching(pressed) if among and pressed else None
-    if among is None or touching is None:
-        return solve_penalty_mode(reduced, penalty, opened, mask, known, among.within() if among else None)
-    rates, forces = touching.of_pairs(penalty.gap_jacobian), touching.of_pairs(penalty.force_direction)
-    own_penalty = penalty._replace(gap_jacobian=rates, force_direction=forces)
-    every = list(range(len(pressed)))
-    own = pressed_mode(touching.model(reduced), own_penalty, every, known, among.within(touching.rows))
-    return watched(touching.among_all(own, opened, n, q), penalty, mask)
-
-
-def friction_mode_among(
-    among: OpenBodies | None, reduced: ReducedModel, pairs: FrictionPairs, mask: int, known: Solved | None
-) -> FrictionMode:
-    """The contact mode of `solve_friction_mode`."""
+    `opened` is that with every pair open, None where it is the mode asked for.
+    """
     closed, (q, n) = pairs.closed(mask), pairs.gap_jacobian.shape
     touching = among.touching(closed) if among and closed else None
     if among is None or touching is None:
-        return solve_friction_mode(reduced, pairs, mask, known, among.within() if among else None)
-    own_pairs = replace(
-        pairs,
-        gap_jacobian=touching.of_pairs(pairs.gap_jacobian),
-        friction_direction=touching.of_pairs(pairs.friction_direction),
-        rim_speed=pairs.rim_speed[closed],
-    )
-    states = states_of(mask, q)
-    own_mask = mask_of([states[i] for i in closed])
-    own_open = among.within(touching.rows)
-    own = solve_friction_mode(touching.model(reduced), own_pairs, own_mask, known, own_open)
-    assert isinstance(among.opened, FrictionMode)
+        bodies = among.within() if among else None
+        if isinstance(pairs, FrictionPairs):
+            return solve_friction_mode(reduced, pairs, mask, known, bodies)
+        if pairs.stiffness and opened is not None:
+            return solve_penalty_mode(reduced, pairs, opened, mask, known, bodies)
+        return solve_contact_mode(reduced, pairs.gap_jacobian, pairs.force_direction, mask, known, bodies)
+    model, bodies = touching.model(reduced), among.within(touching.rows)
+    rates = touching.of_pairs(pairs.gap_jacobian)
+    if isinstance(pairs, FrictionPairs):
+        own_friction = replace(
+            pairs,
+            gap_jacobian=rates,
+            friction_direction=touching.of_pairs(pairs.friction_direction),
+            rim_speed=pairs.rim_speed[closed],
+        )
+        states = states_of(mask, q)
+        stuck = solve_friction_mode(model, own_friction, mask_of([states[i] for i in closed]), known, bodies)
+        assert isinstance(among.opened, FrictionMode)
+        found = replace(touching.among_all(stuck, among.opened, n, q), mask=mask)
+        watch_open_pairs(found.switch, found.motion, pairs, mask, found.n_mode)
+        return found
+    own_pairs = pairs._replace(gap_jacobian=rates, force_direction=touching.of_pairs(pairs.force_direction))
+    if pairs.stiffness:
+        own = pressed_mode(model, own_pairs, list(range(len(closed))), known, bodies)
+        return watched(touching.among_all(own, among.opened, n, q), pairs, mask)
+    own = solve_contact_mode(model, rates, own_pairs.force_direction, (1 << len(closed)) - 1, known, bodies)
     mode = replace(touching.among_all(own, among.opened, n, q), mask=mask)
-    watch_open_pairs(mode.switch, mode.motion, pairs, mask, mode.n_mode)
+    others = np.setdiff1d(np.arange(q), closed)
+    mode.switch[others] = real_times(pairs.gap_jacobian[others], mode.motion[:n])
+    mode.switch[others, mode.n_eigenmode + 1 + others] += 1.0
     return mode
 
 

@@ -10,11 +10,11 @@ from rubhpc import LumpedStator
 from rubhpc.errors import InputError
 from rubhpc.integrate.branches.arclength import follow
 from rubhpc.integrate.branches.branching import Branching
-from rubhpc.integrate.initial_state import fit_to_gaps
 from rubhpc.integrate.periodic_motions import family as family_module
 from rubhpc.integrate.periodic_motions.family import MOST_KEPT, Family, Operation
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.reduced_model.truncation import SMOOTH
+from rubhpc.integrate.start import fit_to_gaps
 from rubhpc.study.contact_keys import Contact
 from rubhpc.study.tables import Integrator
 

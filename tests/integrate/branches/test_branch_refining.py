@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from rubhpc.integrate.branches import grazing
 from rubhpc.integrate.branches.arclength import Track
 from rubhpc.integrate.branches.events import Event
-from rubhpc.integrate.branches.refining import refined
+from rubhpc.integrate.branches.search import refined
 from rubhpc.integrate.periodic_motions.shooting import NotConverged
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import rubhpc
 from rubhpc.integrate.branches.branching import Branching
-from rubhpc.integrate.branches.least_gap import least_gap
+from rubhpc.integrate.branches.weak_impact import least_gap
 from rubhpc.integrate.periodic_motions.family import Family, Operation
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.study.contact_keys import Contact

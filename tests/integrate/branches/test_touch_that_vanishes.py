@@ -7,7 +7,7 @@ import rubhpc
 from rubhpc.integrate import modal_setup
 from rubhpc.integrate.branches.branching import Branching
 from rubhpc.integrate.branches.grazing import grazing_between, touches
-from rubhpc.integrate.branches.start import shot, simulated
+from rubhpc.integrate.branches.search import shot, simulated
 from rubhpc.integrate.periodic_motions.family import Family, Operation
 from rubhpc.study.contact_keys import Contact
 from rubhpc.study.initial import Initial

@@ -1,6 +1,7 @@
 """Tables filled for a speed are those made again for it."""
 
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -8,22 +9,16 @@ from calling import called
 from trial_rig import trial_rig
 
 from rubhpc.case_arguments import case_of, read_probes
-from rubhpc.integrate.changing_speed.mode_parts import speeds_of
 from rubhpc.integrate.changing_speed.range_curved import RangeCurvedLibrary
-from rubhpc.integrate.changing_speed.range_laws import RangeFrictionLibrary, RangePenaltyLibrary
-from rubhpc.integrate.changing_speed.range_library import RangeLibrary
-from rubhpc.integrate.reduced_model.contact_mode import solve_contact_mode
+from rubhpc.integrate.changing_speed.range_library import RangeLibrary, speeds_of
+from rubhpc.integrate.reduced_model.contact_mode import SlidingPairs, solve_contact_mode, stored_energy
 from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
-from rubhpc.integrate.reduced_model.energy_forms import energies_of
 from rubhpc.integrate.reduced_model.friction_mode import mask_of, solve_friction_mode
-from rubhpc.integrate.reduced_model.mode_tables import tabulate
-from rubhpc.integrate.reduced_model.penalty_mode import Penalty, stored_energy
+from rubhpc.integrate.reduced_model.mode_tables import energies_of, tabulate
 from rubhpc.integrate.reduced_model.reduction import directions
 from rubhpc.integrate.reduced_model.touching import (
-    contact_mode_among,
-    friction_mode_among,
+    mode_among,
     open_bodies,
-    penalty_mode_among,
 )
 from rubhpc.kernels.contact_modes import enter
 from rubhpc.kernels.curved_levels import fill_level
@@ -53,18 +48,16 @@ def measured(mode, reduced, slip, friction, *, width, **levels):
 class Sliding:
     """Gaps closed by multipliers, steady sliding."""
 
-    kind, masks = RangeLibrary, {1: (0, 1), 3: (0, 2, 5)}
+    masks = MappingProxyType({1: (0, 1), 3: (0, 2, 5)})
 
     def keys(self, base):
         return {}
 
     def tables(self, library, reduced, base, mask, levels):
         opened = solve_contact_mode(reduced, library.gap_jacobian, library.force_direction, 0)
-        along, among = (
-            (library.gap_jacobian, library.force_direction),
-            open_bodies(reduced, base.model, opened),
-        )
-        mode = contact_mode_among(among, reduced, along, mask, None)
+        pairs = SlidingPairs(library.gap_jacobian, library.force_direction)
+        among = open_bodies(reduced, base.model, opened)
+        mode = mode_among(among, reduced, pairs, opened, mask, None)
         return measured(mode, reduced, library.slip, library._friction_of(mode), **levels)
 
 
@@ -77,7 +70,6 @@ STATES = {
 class Sticking:
     """Pairs that slide in either sense or stick."""
 
-    kind = RangeFrictionLibrary
     masks = STATES
 
     def pairs(self, base, spin):
@@ -90,34 +82,33 @@ class Sticking:
     def tables(self, library, reduced, base, mask, levels):
         pairs = self.pairs(base, reduced.spin)
         among = open_bodies(reduced, base.model, solve_friction_mode(reduced, pairs, 0))
-        mode = friction_mode_among(among, reduced, pairs, mask, None)
-        return measured(mode, reduced, library.slip[:0], mode.friction_forces(pairs), **levels)
+        mode = mode_among(among, reduced, pairs, None, mask, None)
+        return measured(mode, reduced, library.slip[:0], pairs.friction_forces(mode), **levels)
 
 
 class Springs:
     """Pairs that press, by spring and damper, or are lifted."""
 
-    kind, masks = RangePenaltyLibrary, {1: (0, 1, 2), 3: (0, 0b001_101, 0b011)}
+    masks = MappingProxyType({1: (0, 1, 2), 3: (0, 0b001_101, 0b011)})
 
     def keys(self, base):
         gap, force, _ = directions(base.reduced, base.model, 0.2)
-        return {"penalty": Penalty(1e6, 50.0, gap, force)}
+        return {"pairs": SlidingPairs(gap, force, 1e6, 50.0)}
 
     def tables(self, library, reduced, base, mask, levels):
-        penalty = self.keys(base)["penalty"]
+        penalty = self.keys(base)["pairs"]
         opened = solve_contact_mode(reduced, library.gap_jacobian, library.force_direction, 0)
         among = open_bodies(reduced, base.model, opened)
-        mode = penalty_mode_among(among, reduced, penalty, opened, mask, None)
+        mode = mode_among(among, reduced, penalty, opened, mask, None)
         damped, friction = penalty.damped(reduced, mask), library._friction_of(mode)
         tables = measured(mode, damped, library.slip, friction, **levels)
-        tables.loss[0] += stored_energy(1e6, penalty.gap_jacobian, penalty.pressed(mask), mode, library.width)
+        tables.loss[0] += stored_energy(1e6, penalty.gap_jacobian, penalty.closed(mask), mode, library.width)
         return tables
 
 
 class StickingSprings(Sticking):
     """Friction with stick where springs and dampers press; the last bits are those of lifted pairs."""
 
-    kind = RangeFrictionLibrary
     masks = STATES | {1: (*STATES[1], 1 << lifted_place(1, 0))}
 
     def pairs(self, base, spin):
@@ -126,8 +117,8 @@ class StickingSprings(Sticking):
     def tables(self, library, reduced, base, mask, levels):
         pairs = self.pairs(base, reduced.spin)
         among = open_bodies(reduced, base.model, solve_friction_mode(reduced, pairs, 0))
-        mode = friction_mode_among(among, reduced, pairs, mask, None)
-        damped, friction = pairs.damped(reduced, mask), mode.friction_forces(pairs)
+        mode = mode_among(among, reduced, pairs, None, mask, None)
+        damped, friction = pairs.damped(reduced, mask), pairs.friction_forces(mode)
         tables = measured(mode, damped, library.slip[:0], friction, **levels)
         tables.loss[0] += stored_energy(1e6, pairs.gap_jacobian, pairs.closed(mask), mode, library.width)
         return tables
@@ -141,8 +132,8 @@ LAWS = Sliding(), Sticking(), Springs(), StickingSprings()
 def test_a_tuned_mode_is_the_mode_at_that_speed(q, law):
     base, masks = setup(q), law.masks[q]
     phasor = (base.reduced.force[0] - 1j * base.reduced.force[1]) / base.spin**2
-    levels = {"sample_level": base.sample_level, "n_level": base._n_level}
-    library = law.kind(
+    levels = {"sample_level": base.sample_level, "n_level": base.n_level}
+    library = RangeLibrary(
         base.reduced,
         base.model,
         0.2,
@@ -175,7 +166,7 @@ def test_a_tuned_mode_is_the_mode_at_that_speed(q, law):
         expected = law.tables(library, reduced, base, mask, levels)
         for name in expected._fields:
             values, anew = getattr(found, name)[place], getattr(expected, name)[0]
-            if name == "output" and library._closed_pairs(mask):  # only the first sample is read
+            if name == "output" and library._pairs.closed(mask):  # only the first sample is read
                 values, anew = values[:, : len(library._output)], anew[:, : len(library._output)]
             largest = np.abs(anew).max(initial=0.0)
             assert np.abs(values - anew).max(initial=0.0) <= 1e-9 * largest, name
@@ -187,8 +178,8 @@ def test_energy_balances_while_the_unbalance_force_grows(growth):
     base, spin, law = setup(3), 231.0, Sliding()
     phasor = (base.reduced.force[0] - 1j * base.reduced.force[1]) / base.spin**2
     factor = (spin**2 - 40.0j) * np.exp(0.7j)
-    levels = {"sample_level": base.sample_level, "n_level": base._n_level}
-    library = law.kind(base.reduced, base.model, 0.2, phasor=phasor, known={}, tick=base.tick, **levels)
+    levels = {"sample_level": base.sample_level, "n_level": base.n_level}
+    library = RangeLibrary(base.reduced, base.model, 0.2, phasor=phasor, known={}, tick=base.tick, **levels)
     library.tune(speeds_of([spin], [factor], [growth], [base.tick], base.spin, base.sample_level), 0)
     reduced, n, time = base.reduced, len(base.reduced.stiffness), 1e-3
     for mask in law.masks[3]:
@@ -225,7 +216,7 @@ def test_tables_of_curved_gaps_are_those_at_that_speed(q):
     factor = (spin**2 - 40.0j) * np.exp(0.7j)
     force = np.stack([(phasor * factor).real, -(phasor * factor).imag])
     reduced = replace(base.reduced, spin=spin, force=force)
-    levels = {"known": {}, "sample_level": base.sample_level, "n_level": base._n_level}
+    levels = {"known": {}, "sample_level": base.sample_level, "n_level": base.n_level}
     case = base.model, 0.2
     library = RangeCurvedLibrary(
         base.reduced, *case, phasor=phasor, at_piece=lambda: reduced, tick=base.tick, **levels

@@ -8,7 +8,7 @@ from calling import called
 from test_filled_modes import LAWS, setup
 
 from rubhpc.integrate.changing_speed.mode_courses import NODES
-from rubhpc.integrate.changing_speed.mode_parts import speeds_of
+from rubhpc.integrate.changing_speed.range_library import RangeLibrary, speeds_of
 from rubhpc.kernels.contact_modes import enter, enter_rest
 
 enter = called(enter)
@@ -72,7 +72,7 @@ def assert_primitives(tables, row):
 
 def library_of(base, law, at):
     phasor = (base.reduced.force[0] - 1j * base.reduced.force[1]) / base.spin**2
-    return law.kind(
+    return RangeLibrary(
         at(0.0),
         base.model,
         0.2,
@@ -80,7 +80,7 @@ def library_of(base, law, at):
         known={},
         tick=base.tick,
         sample_level=base.sample_level,
-        n_level=base._n_level,
+        n_level=base.n_level,
         reach=REACH,
         **law.keys(base),
         beside=[at(place) for place in NODES[1:]],
@@ -97,7 +97,7 @@ def error_at(base, law, at, masks, place):
     library.tune(speeds_of([spin], [factor], [0.0], [base.tick], *held), 0)
     force = np.stack([(phasor * factor).real, -(phasor * factor).imag])
     reduced = replace(at(place), spin=spin, force=force)
-    levels = {"sample_level": base.sample_level, "n_level": base._n_level, "tick": base.tick}
+    levels = {"sample_level": base.sample_level, "n_level": base.n_level, "tick": base.tick}
     worst = 0.0
     for mask in masks:
         assert library.add(mask)

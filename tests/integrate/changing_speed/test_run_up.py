@@ -12,7 +12,7 @@ from trial_rig import trial_rig
 
 from rubhpc import LumpedStator, Rig, Unbalance, run_up, simulate
 from rubhpc.errors import InputError
-from rubhpc.integrate.changing_speed import stretch
+from rubhpc.integrate.changing_speed import passing
 from rubhpc.integrate.changing_speed.run_up import integrate_run_up
 from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.pieces import Pieces
@@ -286,15 +286,16 @@ def test_what_was_seen_of_pieces_that_fail_together_is_forgotten(monkeypatch):
     """Every stretch ends with its first part, beyond its limit of energy: its pieces are taken one by one."""
     case = {"clearance": "60 um", "friction": 0.2, "samples_per_revolution": 64}
     law = {"speed_law": [(0.0, 200.0), (0.6, 240.0), (3.0, 250.0)], "pieces_per_revolution": 8}
-    monkeypatch.setattr("rubhpc.integrate.changing_speed.passing.take_stretch", lambda *_: None)
+    take_stretch = passing.take_stretch
+    monkeypatch.setattr(passing, "take_stretch", lambda *_: None)
     apart = run_up(trial_rig(2), **law, **case)
-    monkeypatch.setattr(stretch, "Pieces", lambda **fields: Pieces(**(fields | {"energy_limit": -1.0})))
+    monkeypatch.setattr(passing, "Pieces", lambda **fields: Pieces(**(fields | {"energy_limit": -1.0})))
     n_failed = 0
 
     def fail(march, *given):
         nonlocal n_failed
         before = march._recorder.last.copy()
-        assert stretch.take_stretch(march, *given) is None
+        assert take_stretch(march, *given) is None
         assert np.array_equal(march._recorder.last, before, equal_nan=True)
         n_failed += 1
 

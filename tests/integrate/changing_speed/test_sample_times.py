@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from rubhpc.integrate.changing_speed.sample_times import bring_to_angles
+from rubhpc.integrate.changing_speed.turns import bring_to_angles
 from rubhpc.kernels.resampling import resample
 from rubhpc.study.speed_law import SpeedLaw
 

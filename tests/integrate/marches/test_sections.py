@@ -5,10 +5,10 @@ import pytest
 
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import first_lateral_frequency
-from rubhpc.integrate.initial_state import at_rest
 from rubhpc.integrate.marches.closed_form import closed_form_march
 from rubhpc.integrate.marches.friction import FrictionMarch
 from rubhpc.integrate.setup import prepare
+from rubhpc.integrate.start import at_rest
 from rubhpc.integrate.transient import idle_of, pass_revolutions
 from rubhpc.kernels.case_progress import CONTACT_UNSOLVED
 from rubhpc.rig.reading import read_rig

@@ -6,8 +6,8 @@ from itertools import repeat
 import numpy as np
 import pytest
 
+from rubhpc.integrate.measuring.orbit_measures import cycle_distances, is_torus
 from rubhpc.integrate.measuring.orbit_measures import period as period_of
-from rubhpc.integrate.measuring.recorded_orbit import cycle_distances, is_torus
 from rubhpc.integrate.measuring.regimes import LASTING_REVOLUTIONS, Solution, by_growth, regime
 from rubhpc.schema import REGIME
 

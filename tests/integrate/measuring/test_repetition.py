@@ -5,7 +5,7 @@ import pytest
 from trial_rig import trial_rig
 
 from rubhpc.fem.assemble import assemble
-from rubhpc.integrate.measuring.repetition import Part, repeated_samples, repeated_sums
+from rubhpc.integrate.marched_record import Part, repeated_samples, repeated_sums
 from rubhpc.integrate.measuring.samples import empty_samples, new_accumulator
 
 Q = 2

@@ -5,8 +5,7 @@ import pytest
 from trial_rig import trial_rig
 
 from rubhpc.fem.assemble import assemble
-from rubhpc.integrate.reduced_model.along_speeds import AlongSpeeds
-from rubhpc.integrate.reduced_model.reduction import reduce_model
+from rubhpc.integrate.reduced_model.reduction import AlongSpeeds, reduce_model
 from rubhpc.integrate.reduced_model.truncation import kept_modes
 
 ENDS = (150.0, 260.0)

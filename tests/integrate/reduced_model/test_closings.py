@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from rubhpc.integrate.reduced_model import closings as module
-from rubhpc.integrate.reduced_model.closings import Closings
-from rubhpc.integrate.reduced_model.secular_modes import Contact, Eigenmodes, with_contact
+from rubhpc.integrate.reduced_model import secular_modes as module
+from rubhpc.integrate.reduced_model.secular_modes import Closings, Contact, Eigenmodes, with_contact
 from rubhpc.integrate.reduced_model.system_modes import modes_of
 
 N_ROTOR, Q = 12, 4

@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 from scipy.integrate import simpson
 
-from rubhpc.integrate.reduced_model.energy_forms import energies_of
 from rubhpc.integrate.reduced_model.friction_mode import (
     FrictionPairs,
     mask_of,
     solve_friction_mode,
     states_of,
 )
-from rubhpc.integrate.reduced_model.mode_tables import tabulate
+from rubhpc.integrate.reduced_model.mode_tables import energies_of, tabulate
 from rubhpc.integrate.reduced_model.reduction import ReducedModel
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK
 

@@ -12,8 +12,7 @@ from rubhpc.errors import InputError
 from rubhpc.integrate.reduced_model import system_modes
 from rubhpc.integrate.reduced_model.contact_mode import confine, solve_contact_mode
 from rubhpc.integrate.reduced_model.reduction import directions, reduce_model
-from rubhpc.integrate.reduced_model.repeated_exponents import separate
-from rubhpc.integrate.reduced_model.system_modes import solve_part
+from rubhpc.integrate.reduced_model.system_modes import separate, solve_part
 from rubhpc.rig.parts import Damping
 
 N_STATOR, FRICTION = 12, 0.1

@@ -9,9 +9,8 @@ from overhung_pump import SEGMENT, pump
 
 from rubhpc import LumpedStator
 from rubhpc.integrate.reduced_model import contact_mode, secular_modes
-from rubhpc.integrate.reduced_model.closings import Closings, Within
 from rubhpc.integrate.reduced_model.friction_mode import mask_of
-from rubhpc.integrate.reduced_model.secular_modes import Contact, Eigenmodes, with_contact
+from rubhpc.integrate.reduced_model.secular_modes import Closings, Contact, Eigenmodes, Within, with_contact
 from rubhpc.integrate.reduced_model.system_modes import modes_of
 from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, STUCK

@@ -3,22 +3,17 @@
 import numpy as np
 import pytest
 
-from rubhpc.integrate.reduced_model.contact_mode import solve_contact_mode
+from rubhpc.integrate.reduced_model.contact_mode import SlidingPairs, solve_contact_mode
 from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs, mask_of, solve_friction_mode
-from rubhpc.integrate.reduced_model.mode_tables import Spared, tabulate
-from rubhpc.integrate.reduced_model.penalty_mode import Penalty
 from rubhpc.integrate.reduced_model.reduction import ReducedModel
 from rubhpc.integrate.reduced_model.touching import (
     OpenBodies,
-    contact_mode_among,
-    friction_mode_among,
-    penalty_mode_among,
+    mode_among,
 )
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK
 
 Q, N_ROTOR, N_STATOR = 6, 5, 2  # pairs, and degrees of the rotor and of each stator
 N = N_ROTOR + Q * N_STATOR
-WIDTH = 64
 
 
 @pytest.fixture(scope="module")
@@ -77,18 +72,14 @@ def solved(bodies, law, states):
     if law == "friction":
         opened = solve_friction_mode(reduced, pairs, 0)
         among, mask = OpenBodies(reduced, opened, seen), mask_of(states)
-        modes = [friction_mode_among(bodies, reduced, pairs, mask, None) for bodies in (None, among)]
-        return modes, among, closed, reduced, [mode.friction_forces(pairs) for mode in modes]
+        modes = [mode_among(bodies, reduced, pairs, opened, mask, None) for bodies in (None, among)]
+        return modes, among, closed, reduced, [pairs.friction_forces(mode) for mode in modes]
     opened = solve_contact_mode(reduced, *directions, 0)
     among = OpenBodies(reduced, opened, seen)
-    if law == "penalty":
-        penalty = Penalty(3e5, 40.0, *directions)
-        modes = [penalty_mode_among(of, reduced, penalty, opened, mask, None) for of in (None, among)]
-        reduced = penalty.damped(reduced, mask)
-    else:
-        modes = [contact_mode_among(of, reduced, directions, mask, None) for of in (None, among)]
-    across = (along - pairs.gap_jacobian)[closed].T
-    return modes, among, closed, reduced, [across @ mode.switch[closed] for mode in modes]
+    sliding = SlidingPairs(*directions, *((3e5, 40.0) if law == "penalty" else ()))
+    modes = [mode_among(of, reduced, sliding, opened, mask, None) for of in (None, among)]
+    reduced = sliding.damped(reduced, mask)
+    return modes, among, closed, reduced, [sliding.friction_forces(mode) for mode in modes]
 
 
 @pytest.mark.parametrize("law", ["sliding", "penalty", "friction"])
@@ -112,21 +103,3 @@ def test_what_touches_moves_alone(bodies, law, states):
         assert found.shape == expected.shape
         size = abs(expected).max(initial=1e-300)
         assert abs(found - expected).max(initial=0.0) < 1e-9 * size
-
-
-@pytest.mark.parametrize("law", ["sliding", "friction"])
-@pytest.mark.parametrize("n_ahead", [1, 8])
-@pytest.mark.parametrize("states", STATES[1:3])
-def test_outputs_of_modes_that_stay_are_copied(bodies, law, n_ahead, states):
-    (_, mode), among, closed, reduced, _ = solved(bodies, law, states)
-    touching = among.touching(closed)
-    given = {"width": WIDTH, "tick": 1e-6, "sample_level": 4, "n_level": 6, "n_ahead": n_ahead}
-    opened = tabulate(among.opened, reduced, np.zeros((0, N)), **given)
-    own = mode.n_eigenmode - touching.spared.size
-    spared = Spared(own, touching.spared, np.where(opened.output[0] == 0.0, 0.0, 2.0 * opened.output[0]))
-    whole = tabulate(mode, reduced, np.zeros((0, N)), **given).output[0]
-    copied = tabulate(mode, reduced, np.zeros((0, N)), spared=spared, **given).output[0]
-    twice = np.zeros(2 * WIDTH, dtype=bool)
-    twice[own : mode.n_eigenmode] = twice[WIDTH + own : WIDTH + mode.n_eigenmode] = True
-    assert copied[~twice] == pytest.approx(whole[~twice], rel=1e-12, abs=1e-12 * abs(whole).max())
-    assert copied[twice] == pytest.approx(2.0 * whole[twice], rel=1e-9, abs=1e-12 * abs(whole).max())

@@ -12,15 +12,17 @@ from rubhpc import simulate
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.probes import with_probes
 from rubhpc.integrate.reduced_model import truncation
-from rubhpc.integrate.reduced_model.standstill import at_standstill, cutoff_frequency, modes_below
 from rubhpc.integrate.reduced_model.truncation import (
     SMOOTH,
     Touch,
+    at_standstill,
     bounce_spectrum,
     coupled_ringing,
+    cutoff_frequency,
     impact_share,
     kept_modes,
     modal_error,
+    modes_below,
     pulse_spectrum,
     static_inertia,
     struck_share,
