@@ -46,9 +46,9 @@ def tune_curved(
     motion_re, motion_im : (2 n, m)
         Displacements, then velocities, by the coordinates.
     row : (q, 3 + b, n)
-        `curved_bodies.motion_rows`.
+        `curved_library.motion_rows`.
     dampers : (n, r)
-        `curved_tables.StillParts`.
+        `curved_library.StillParts`.
     stiffness, damping, force : (n, n), (n, n), (2, n)
         As in `reduction.ReducedModel`.
     work : (2, n)
