@@ -12,6 +12,7 @@ from rubhpc.fem.response import step_limit
 from rubhpc.integrate.measuring.divergence import energy_limit
 from rubhpc.integrate.packing import Packed, law_of, pack
 from rubhpc.integrate.scheme import Scheme
+from rubhpc.kernels.central_difference import Stepper
 from rubhpc.kernels.laws import MULTIPLIER
 
 if TYPE_CHECKING:
@@ -35,6 +36,19 @@ class CentralDifferenceSetup:
     is_updated: bool  # normal
     displacement_limit: float  # m
     law: Law = MULTIPLIER
+
+    @cached_property
+    def stepper(self) -> Stepper:
+        """The bodies and the steps, as the kernel takes them."""
+        return Stepper(
+            linear=self.packed.linear,
+            spin=self.spin,
+            step=self.step,
+            samples_per_revolution=self.samples_per_revolution,
+            displacement_limit=self.displacement_limit,
+            output_row=self.packed.output_row,
+            probe=self.packed.probe,
+        )
 
     @cached_property
     def energy_limit(self) -> float:

@@ -8,15 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import linked_sum
-from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.case_progress import CONTACT_UNSOLVED, DIVERGED, UNDER_WAY, Clock, Progress, shaft_turn
 from rubhpc.kernels.contact_modes import FORCED_LEVEL, ModeTables, Reduced
 from rubhpc.kernels.event_steps import enter_wanted, leave_mode, record_event, record_touch
 from rubhpc.kernels.measuring import begin_contact, begin_span
-from rubhpc.kernels.mode_change import change_contacts, product
+from rubhpc.kernels.mode_change import EventWork, change_contacts, product
 from rubhpc.kernels.penalty_events import change_pressed
 from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
-from rubhpc.kernels.trail import Trail, no_trail, note_after, note_event, note_piece
+from rubhpc.kernels.trail import Trail, note_after, note_event, note_piece
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
@@ -24,31 +23,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 MOST_EVENTS = 200_000  # in a revolution; more is chatter without end
-
-
-class EventWork(Struct):
-    """Work space of an event, q pairs."""
-
-    force: Floats  # (q,)
-    given: Floats  # (2, q), normal impulses of the event, N s, and tractions, which none has
-    speed: Floats  # (q,)
-    impulse: Floats  # (q,), accumulated before the event, N s
-    active: NDArray[np.bool_]  # (q,)
-    elimination: Floats  # (q, q + 1)
-    trail: Trail  # of the motion
-
-
-def event_work(q: int) -> EventWork:
-    """Work space of the events of q pairs, without a trail."""
-    return EventWork(
-        force=np.zeros(q),
-        given=np.zeros((2, q)),
-        speed=np.zeros(q),
-        impulse=np.zeros(q),
-        active=np.zeros(q, dtype=np.bool_),
-        elimination=np.zeros((q, q + 1)),
-        trail=no_trail(),
-    )
 
 
 @linked_sum
@@ -122,11 +96,7 @@ def take_event(
             sine,
             motion,
             is_recorded,
-            work.force,
-            work.given[0],
-            work.speed,
-            work.active,
-            work.elimination,
+            work,
             accumulator,
         )
     if progress.wanted < 0 or progress.n_event > MOST_EVENTS:

@@ -17,12 +17,13 @@ from rubhpc.kernels.case_progress import (
     Progress,
     shaft_turn,
 )
-from rubhpc.kernels.contact_event import MOST_EVENTS, EventWork
+from rubhpc.kernels.contact_event import MOST_EVENTS
 from rubhpc.kernels.contact_modes import FORCED_LEVEL, ModeTables, Reduced
 from rubhpc.kernels.curved_change import change_curved
 from rubhpc.kernels.curved_contact import CurvedPairs, CurvedTables, CurvedWork, is_closed
 from rubhpc.kernels.curved_measuring import place
 from rubhpc.kernels.event_steps import end_mode, record_event, record_touch
+from rubhpc.kernels.mode_change import EventWork  # noqa: TC001 - part of a kernel's signature
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
@@ -72,10 +73,7 @@ def take_curved_event(
         motion,
         is_recorded,
         work,
-        events.force,
-        events.speed,
-        events.active,
-        events.elimination,
+        events,
         accumulator,
     )
     if progress.wanted < 0 or progress.n_event > MOST_EVENTS:

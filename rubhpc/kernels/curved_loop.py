@@ -63,7 +63,7 @@ from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
-    from rubhpc.kernels.contact_event import EventWork
+    from rubhpc.kernels.mode_change import EventWork
 
 Floats = NDArray[np.float64]
 

@@ -78,7 +78,6 @@ def advance_with_friction(
     # Tuples are opened here: a field read inside the loop would count a reference at every step.
     mask, switch_re, switch_im = tables.mask, tables.switch_re, tables.switch_im
     rate_re, rate_im = tables.rate_re, tables.rate_im
-    bend_re, bend_im, turn = tables.bend_re, tables.bend_im, tables.turn
     power_re, power_im, n_eigenmode = tables.power_re, tables.power_im, tables.n_eigenmode
     rim_speed, overlap = bodies.rim_speed, reduced.overlap
     highest_level = power_re.shape[1] - 1
@@ -117,14 +116,8 @@ def advance_with_friction(
             if not is_at_event and progress.tick >= renewed_at and progress.tick + (1 << longest) > sure_to:
                 free_to, sure_to = free_until(
                     states,
+                    tables,
                     mode,
-                    switch_re,
-                    switch_im,
-                    rate_re,
-                    rate_im,
-                    bend_re,
-                    bend_im,
-                    turn,
                     z_re,
                     z_im,
                     progress.tick,

@@ -32,7 +32,7 @@ from rubhpc.kernels.pieces import (
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
-    from rubhpc.kernels.contact_event import EventWork
+    from rubhpc.kernels.mode_change import EventWork
     from rubhpc.kernels.sampling import Recorder
 
 Floats = NDArray[np.float64]

@@ -12,9 +12,9 @@ from rubhpc.integrate.marches.contact_sets import ContactSets
 from rubhpc.integrate.marches.march import ALL_SAMPLES
 from rubhpc.integrate.marches.met_modes import MetModes, NoClosedForm
 from rubhpc.kernels.case_progress import FINISHED, MODE_WANTED, NO_SECTIONS, PAUSED, Sections, restart_clock
-from rubhpc.kernels.contact_event import event_work
 from rubhpc.kernels.contact_modes import DYING
 from rubhpc.kernels.event_loop import advance
+from rubhpc.kernels.mode_change import event_work
 from rubhpc.kernels.piece_loop import advance_pieces
 from rubhpc.kernels.pieces import FAST, QUICK
 from rubhpc.kernels.trail import Trail, begin_trail, new_trail, no_trail
