@@ -61,22 +61,22 @@ class PieceRows(Struct):
 
 
 class Passage(Struct):
-    """A motion that is followed through r revolutions; all changes in place."""
+    """How far a motion has been followed; all changes in place."""
 
     reached: Ints  # (4,), pieces filled in, states of the pairs, revolution, and pieces before that
     passed: Floats  # (1,), s, time reached in the revolution
     motion: Floats  # (2 n,)
-    least: Floats  # (r, 2, q), as in `flow.follow_piece`, of each revolution
 
 
-def new_passage(motion: Floats, states: int, n_revolution: int, q: int, begin: float = 0.0) -> Passage:
-    """Begin with a motion (2 n,), which is copied, and these states of q pairs, at a time (s)."""
-    return Passage(
-        reached=np.array([0, states, 0, 0]),
-        passed=np.array([begin]),
-        motion=motion.copy(),
-        least=np.full((n_revolution, 2, q), np.inf),
-    )
+def new_passage(width: int) -> Passage:
+    """Arrays for motions of this width (2 n)."""
+    return Passage(reached=np.zeros(4, dtype=np.int64), passed=np.zeros(1), motion=np.zeros(width))
+
+
+def begin_passage(passage: Passage, motion: Floats, states: int, begin: float) -> None:
+    """Begin with a motion (2 n,) and the pairs in these states, a time (s) after the shaft's angle 0."""
+    passage.reached[:] = 0, states, 0, 0
+    passage.passed[0], passage.motion[:] = begin, motion
 
 
 def piece_rows(k: int, width: int, n_switch: int, q: int) -> PieceRows:
@@ -99,6 +99,7 @@ def follow_revolutions(
     takes_events: bool,
     passage: Passage,
     rows: PieceRows,
+    least: Floats,
     work: EventWork,
     accumulator: Accumulator,
 ) -> int:
@@ -108,10 +109,12 @@ def follow_revolutions(
     ----------
     takes_events : bool
         Whether events are computed here; else each is left to the caller, who changes motion and states.
+    least : (r, 2, q)
+        As in `flow.follow_piece`, for each of the r revolutions.
     work : EventWork, accumulator : Accumulator
         Work space; the accumulator is not changed.
     """
-    reached, passed, motion, least = passage.reached, passage.passed, passage.motion, passage.least
+    reached, passed, motion = passage.reached, passage.passed, passage.motion
     while reached[REVOLUTION] < least.shape[0]:
         k, states = reached[PIECE], reached[STATES]
         if k - reached[BEGUN] > timing.most_events:

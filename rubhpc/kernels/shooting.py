@@ -99,10 +99,11 @@ def search_period(
     passage: Passage,
     first_rows: PieceRows,
     second_rows: PieceRows,
+    least: Floats,
     work: EventWork,
     accumulator: Accumulator,
 ) -> int:
-    """Search for a motion that closes after as many revolutions as a passage has.
+    """Search for a motion that closes after as many revolutions as `least` has rows.
 
     Newton's method on `P(x) - x = 0`. A step is shortened until the residual falls; each share of it begins
     with the states of the pairs with which the best trial ended, then with those with which it began. As long
@@ -114,8 +115,8 @@ def search_period(
         Whether friction is set-valued: events are left to the caller, as by `follow_revolutions`.
     search : Search
         In place.
-    passage : Passage
-        The trial under way.
+    passage, least
+        Of the trial under way, as `follow_revolutions` has them.
     first_rows, second_rows : PieceRows
         Of the best trial and of the one under way, by turns.
 
@@ -139,6 +140,7 @@ def search_period(
                     not has_states,
                     passage,
                     second_rows if now[BEST] == 0 else first_rows,
+                    least,
                     work,
                     accumulator,
                 )
@@ -154,7 +156,7 @@ def search_period(
                     now[N_SHORTEST] = shortest_period(
                         first_rows if now[BEST] == 0 else second_rows,
                         int(now[N_PIECE]),
-                        passage.least.shape[0],
+                        least.shape[0],
                         spin,
                         search,
                     )
@@ -166,11 +168,11 @@ def search_period(
                 else:
                     begin_carrying(CARRYING, search)
             elif now[TRIED] == now[ENDS] and now[ENDS] != now[BEGINS]:
-                begin_trial(int(now[BEGINS]), search, passage)
+                begin_trial(int(now[BEGINS]), search, passage, least)
             else:
                 search.share[SHARE] *= 0.5
                 if search.share[SHARE] >= search.least_step:
-                    begin_trial(int(now[ENDS]), search, passage)
+                    begin_trial(int(now[ENDS]), search, passage, least)
                 elif now[IS_FRESH] != 0:
                     return STALLED
                 else:
@@ -205,7 +207,7 @@ def search_period(
             now[NEXT] = STEPPING
         if now[NEXT] == STEPPING:
             search.share[SHARE] = 1.0
-            begin_trial(int(now[ENDS]), search, passage)
+            begin_trial(int(now[ENDS]), search, passage, least)
 
 
 @linked_sum
@@ -265,7 +267,7 @@ def invert(search: Search) -> bool:
 
 
 @linked_sum
-def begin_trial(states: int, search: Search, passage: Passage) -> None:
+def begin_trial(states: int, search: Search, passage: Passage, least: Floats) -> None:
     """Begin a share of a step from the best trial, with the pairs in these states."""
     reached, motion = passage.reached, passage.motion
     search.now[NEXT], search.now[TRIED] = FOLLOWING, states
@@ -274,7 +276,7 @@ def begin_trial(states: int, search: Search, passage: Passage) -> None:
         motion[i] = search.tried[i]
     reached[PIECE], reached[STATES], reached[REVOLUTION], reached[BEGUN] = 0, states, 0, 0
     passage.passed[0] = 0.0
-    passage.least[:] = np.inf
+    least[:] = np.inf
 
 
 @linked_sum

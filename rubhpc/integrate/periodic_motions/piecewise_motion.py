@@ -33,6 +33,7 @@ from rubhpc.kernels.revolutions import (
     UNSOLVED,
     Passage,
     PieceRows,
+    begin_passage,
     follow_revolutions,
     new_passage,
     piece_rows,
@@ -107,6 +108,8 @@ class PiecewiseMotion:
         self._change_rooms: dict[tuple[int, int], ChangeRoom] = {}
         self._take_tables()
         self._rows = piece_rows(FEW_PIECES, 2 * self.n, self.n_switch, self.q)
+        self._passage = new_passage(2 * self.n)
+        self._asked: tuple[int, int, float, float] | None = None
         clock = self.march.clock
         self.highest = self._tables.power_re.shape[1] - 1
         self.longest = min(self.highest, int(math.log2(self.turn / STEPS_PER_REVOLUTION / clock.tick)))
@@ -184,7 +187,8 @@ class PiecewiseMotion:
     ) -> list[Revolution]:
         """Follow a motion through several revolutions, each as `revolve` does."""
         timing = self.timing(self.longest, most_events, phase, share)
-        passage = new_passage(motion, states, n_revolution, self.q, timing.begin)
+        passage, least = self._passage, np.full((n_revolution, 2, self.q), np.inf)
+        begin_passage(passage, motion, states, timing.begin)
         outcome = MODE_UNKNOWN
         while outcome != FOLLOWED:
             if outcome == MODE_UNKNOWN:
@@ -203,23 +207,27 @@ class PiecewiseMotion:
                 not self.has_states,
                 passage,
                 self._rows,
+                least,
                 *self.march.change_work,
             )
-        return whole_revolutions(copied(self._rows, int(passage.reached[PIECE])), passage.least)
+        return whole_revolutions(copied(self._rows, int(passage.reached[PIECE])), least)
 
     def timing(self, longest: int, most_events: int, phase: float = 0.0, share: float = 1.0) -> Timing:
-        """Times of a share of a revolution from a phase on, in steps up to a level."""
-        clock = self.march.clock
-        return Timing(
-            spin=self.setup.spin,
-            tick=clock.tick,
-            search_level=clock.search_level,
-            longest_level=longest,
-            begin=phase * self.turn,
-            end=(phase + share) * self.turn,
-            moment=self.march.moment,
-            most_events=most_events,
-        )
+        """Times of a share of a revolution from a phase on, in steps up to a level; the last one is kept."""
+        asked, clock = (longest, most_events, phase, share), self.march.clock
+        if self._asked != asked:
+            self._asked = asked
+            self._timing = Timing(
+                spin=self.setup.spin,
+                tick=clock.tick,
+                search_level=clock.search_level,
+                longest_level=longest,
+                begin=phase * self.turn,
+                end=(phase + share) * self.turn,
+                moment=self.march.moment,
+                most_events=most_events,
+            )
+        return self._timing
 
     def why_unfollowed(self, outcome: int, most_events: int) -> str:
         """Why a motion is not followed further, by the outcome of a kernel."""

@@ -21,6 +21,7 @@ from rubhpc.kernels.revolutions import (
     FULL,
     MODE_UNKNOWN,
     STATES,
+    begin_passage,
     new_passage,
     piece_rows,
 )
@@ -180,7 +181,9 @@ class _Shot:
         search: Search,
     ) -> None:
         self._piecewise, self._timing, self.search = piecewise, timing, search
-        self._passage = new_passage(motion, states, period, piecewise.q)
+        self._passage = new_passage(motion.size)
+        begin_passage(self._passage, motion, states, timing.begin)
+        self._least = np.full((period, 2, piecewise.q), np.inf)
         k = FEW_PIECES * period
         self._rows = [piece_rows(k, motion.size, piecewise.n_switch, piecewise.q) for _ in range(2)]
         search.tried[:] = motion
@@ -230,7 +233,7 @@ class _Shot:
 
     def revolutions(self, n_piece: int) -> list[Revolution]:
         """Those of the best trial, up to a piece."""
-        return whole_revolutions(copied(self._rows[int(self.search.now[BEST])], n_piece), self._passage.least)
+        return whole_revolutions(copied(self._rows[int(self.search.now[BEST])], n_piece), self._least)
 
     def _wanted(self) -> int:
         """States of the pairs whose contact mode the kernel asks for."""
@@ -252,6 +255,7 @@ class _Shot:
             self._passage,
             self._rows[0],
             self._rows[1],
+            self._least,
             *piecewise.march.change_work,
         )
 
