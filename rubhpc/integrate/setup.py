@@ -18,6 +18,7 @@ from rubhpc.integrate.packing import Packed, law_of, pack
 from rubhpc.integrate.reduced_model.reduction import reduce_model
 from rubhpc.integrate.reduced_model.truncation import touch_of
 from rubhpc.integrate.scheme import Scheme, scheme_of
+from rubhpc.kernels.central_difference import Stepper
 from rubhpc.kernels.laws import MULTIPLIER
 from rubhpc.study.tables import SEARCH_STEP
 
@@ -47,6 +48,19 @@ class CentralDifferenceSetup:
     is_updated: bool  # normal
     displacement_limit: float  # m
     law: Law = MULTIPLIER
+
+    @cached_property
+    def stepper(self) -> Stepper:
+        """The bodies and the steps, as the kernel takes them."""
+        return Stepper(
+            linear=self.packed.linear,
+            spin=self.spin,
+            step=self.step,
+            samples_per_revolution=self.samples_per_revolution,
+            displacement_limit=self.displacement_limit,
+            output_row=self.packed.output_row,
+            probe=self.packed.probe,
+        )
 
     @cached_property
     def energy_limit(self) -> float:

@@ -16,6 +16,7 @@ import numba
 import numpy as np
 from llvmlite import ir
 from numba import types
+from numba.core import cgutils
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import (
     NativeValue,
@@ -152,10 +153,12 @@ def _words_of(value: Any) -> tuple[int, ...]:
 
 @unbox(StructType)
 def _unbox(typ: StructType, held: Any, c: Any) -> NativeValue:
+    value = cgutils.alloca_once(c.builder, cgutils.voidptr_t, zfill=True)
     address = c.pyapi.object_getattr_string(held, "_address")
-    value = c.pyapi.long_as_voidptr(address)
-    c.pyapi.decref(address)
-    return NativeValue(value, is_error=c.pyapi.c_api_error())
+    with c.builder.if_then(cgutils.is_not_null(c.builder, address)):  # Ctrl-C may end what finds it
+        c.builder.store(c.pyapi.long_as_voidptr(address), value)
+        c.pyapi.decref(address)
+    return NativeValue(c.builder.load(value), is_error=c.pyapi.c_api_error())
 
 
 @infer_getattr

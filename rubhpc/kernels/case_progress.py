@@ -34,6 +34,14 @@ class Clock(Struct):
     growth: float  # 1/s, of the unbalance force from tick 0 on; 0 at a constant speed
 
 
+class Coordinates(Struct):
+    """Where a case stands in its contact mode, and its motion where it changes that."""
+
+    z: Floats  # (2, m), modal coordinates, real and imaginary
+    z_next: Floats  # (2, m), work space
+    motion: Floats  # (2 n,), reduced displacements, then velocities
+
+
 class Sections(Struct):
     """Ends of revolutions before tick 0, where the motion is kept."""
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit, linked
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.accumulators import (
     DAMPING_LOSS,
     IMPACT_LOSS,
@@ -43,6 +44,18 @@ FINISHED, DIVERGED, CONTACT_UNSOLVED = range(3)
 DECAYED = 1e-150  # m, m/s, rad or rad/s
 
 
+class Stepper(Struct):
+    """Bodies of one rig and speed, and the steps in which a case of them is advanced."""
+
+    linear: Linear
+    spin: float  # rad/s
+    step: float  # s
+    samples_per_revolution: int
+    displacement_limit: float  # m, of the output node or of a rim, beyond which a case has diverged
+    output_row: Ints  # (3,), of vertical, horizontal and torsional displacement of the output node; -1: held
+    probe: Floats  # (3, n_probe, n_dof), weights of displacements, velocities and accelerations
+
+
 @linked
 def apply_contact(
     start: Ints,
@@ -74,18 +87,12 @@ def apply_contact(
 
 @jit
 def advance(
-    linear: Linear,
+    stepper: Stepper,
     pairs: Pairs,
-    spin: float,
-    step: float,
     steps_per_sample: int,
-    samples_per_revolution: int,
     first_sample: int,
     last_sample: int,
     is_recorded: bool,
-    displacement_limit: float,
-    output_row: Ints,
-    probe: Floats,
     state: Floats,
     work: Workspace,
     scratch: Floats,
@@ -101,16 +108,10 @@ def advance(
 
     Parameters
     ----------
-    spin, step : float, rad/s and s
-        Rotation speed and time step; `steps_per_sample` steps fill the interval between two samples.
+    steps_per_sample : int
+        Steps that fill the interval between two samples.
     is_recorded : bool
         Whether to fill `samples` (at index i - first recorded sample = i) and `accumulator`.
-    displacement_limit : float, m
-        Displacement of the output node or of a rim beyond which the case has diverged.
-    output_row : (3,)
-        Rows of vertical, horizontal and torsional displacement of the output node; -1 where constrained.
-    probe : (3, n_probe, n_dof)
-        Weights of displacements, velocities and accelerations in the reading of each probe.
     state : (2, n_dof), m and m/s (rad and rad/s)
         Displacement, and velocity half a step earlier; advanced in place.
     scratch : (3, n_dof)
@@ -123,7 +124,8 @@ def advance(
     int
         FINISHED, DIVERGED or CONTACT_UNSOLVED.
     """
-    # Tuples are unpacked here: reading a field inside the loop would count a reference at every step.
+    linear, spin, step, output_row = stepper.linear, stepper.spin, stepper.step, stepper.output_row
+    samples_per_revolution = stepper.samples_per_revolution
     displacement, velocity = state[0], state[1]
     velocity_next, damping_force, residual = scratch[0], scratch[1], scratch[2]
     row, axis_y, axis_z, radius, clearance, aside = (
@@ -220,7 +222,9 @@ def advance(
                         velocity_next[twist] - velocity[twist]
                     ) / step
                 if i_step == 0:
-                    read_probes(probe, step, displacement, velocity, velocity_next, i_sample, samples.probe)
+                    read_probes(
+                        stepper.probe, step, displacement, velocity, velocity_next, i_sample, samples.probe
+                    )
             if is_touching and bounces:  # displacement by a force before the time of its impact
                 late[:] = -delay
                 for k in range(n_dof):
@@ -246,7 +250,7 @@ def advance(
             )
             was_touching = is_touching
         flush_decayed(state)
-        if has_diverged(displacement, output_row, row, displacement_limit):
+        if has_diverged(displacement, output_row, row, stepper.displacement_limit):
             reached[0] = i_sample
             return DIVERGED
     return FINISHED

@@ -2,53 +2,30 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import linked_sum
-from rubhpc.kernels._struct import Struct
-from rubhpc.kernels.case_progress import CONTACT_UNSOLVED, DIVERGED, UNDER_WAY, Clock, Progress, shaft_turn
+from rubhpc.kernels.case_progress import (
+    CONTACT_UNSOLVED,
+    DIVERGED,
+    UNDER_WAY,
+    Clock,
+    Coordinates,
+    Progress,
+    shaft_turn,
+)
 from rubhpc.kernels.contact_modes import FORCED_LEVEL, ModeTables, Reduced
 from rubhpc.kernels.event_steps import enter_wanted, leave_mode, record_event, record_touch
 from rubhpc.kernels.measuring import begin_contact, begin_span
-from rubhpc.kernels.mode_change import change_contacts, product
+from rubhpc.kernels.mode_change import EventWork, change_contacts, product
 from rubhpc.kernels.penalty_events import change_pressed
-from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
-from rubhpc.kernels.trail import Trail, no_trail, note_after, note_event, note_piece
-
-if TYPE_CHECKING:
-    from rubhpc.kernels.accumulators import Accumulator, Samples
+from rubhpc.kernels.sampling import Measured, Recorder  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.trail import Trail, note_after, note_event, note_piece
 
 Floats = NDArray[np.float64]
 
 MOST_EVENTS = 200_000  # in a revolution; more is chatter without end
-
-
-class EventWork(Struct):
-    """Work space of an event, q pairs."""
-
-    force: Floats  # (q,)
-    given: Floats  # (2, q), normal impulses of the event, N s, and tractions, which none has
-    speed: Floats  # (q,)
-    impulse: Floats  # (q,), accumulated before the event, N s
-    active: NDArray[np.bool_]  # (q,)
-    elimination: Floats  # (q, q + 1)
-    trail: Trail  # of the motion
-
-
-def event_work(q: int) -> EventWork:
-    """Work space of the events of q pairs, without a trail."""
-    return EventWork(
-        force=np.zeros(q),
-        given=np.zeros((2, q)),
-        speed=np.zeros(q),
-        impulse=np.zeros(q),
-        active=np.zeros(q, dtype=np.bool_),
-        elimination=np.zeros((q, q + 1)),
-        trail=no_trail(),
-    )
 
 
 @linked_sum
@@ -58,24 +35,22 @@ def begin_mode(
     clock: Clock,
     is_recorded: bool,
     progress: Progress,
-    z: Floats,
-    z_next: Floats,
-    motion: Floats,
+    coordinates: Coordinates,
     recorder: Recorder,
     trail: Trail,
 ) -> bool:
-    """Enter the contact mode wanted, if any, with the reduced motion (2 n,), and begin to measure it.
+    """Enter the contact mode wanted, if any, with the reduced motion, and begin to measure it.
 
     Returns False where the mode is not tabulated.
     """
-    is_entered = progress.wanted < 0
-    if not is_entered and enter_wanted(tables, reduced, clock, progress, motion, z):
+    is_entered, z = progress.wanted < 0, coordinates.z
+    if not is_entered and enter_wanted(tables, reduced, clock, progress, coordinates.motion, z):
         is_entered = True
         note_piece(trail, tables.mask[progress.mode], z)
     if is_entered and is_recorded:
         if progress.energy_from < 0:
             begin_span(z, progress, recorder)
-        begin_contact(tables, reduced, progress.mode, z, z_next, recorder)
+        begin_contact(tables, reduced, progress.mode, z, coordinates.z_next, recorder)
     return is_entered
 
 
@@ -87,24 +62,20 @@ def take_event(
     crossing: int,
     is_recorded: bool,
     progress: Progress,
-    z: Floats,
-    motion: Floats,
+    coordinates: Coordinates,
     work: EventWork,
-    recorder: Recorder,
-    samples: Samples,
-    accumulator: Accumulator,
+    measured: Measured,
 ) -> int:
-    """Take the event of the pairs `crossing`: what it makes of `motion`, and the contact mode wanted next.
+    """Take the event of the pairs `crossing`: what it makes of the motion, and the contact mode wanted next.
 
     Returns
     -------
     int
         UNDER_WAY, DIVERGED or CONTACT_UNSOLVED.
     """
-    spin, closed = clock.spin, tables.mask[progress.mode]
-    if not leave_mode(
-        tables, reduced, clock, is_recorded, progress, z, motion, work.impulse, recorder, accumulator
-    ):
+    spin, closed, motion = clock.spin, tables.mask[progress.mode], coordinates.motion
+    samples, accumulator = measured.samples, measured.accumulator
+    if not leave_mode(tables, reduced, clock, is_recorded, progress, coordinates, work.impulse, measured):
         return DIVERGED
     note_event(work.trail, progress.tick, crossing)
     cosine, sine = shaft_turn(clock, progress.tick)
@@ -122,11 +93,7 @@ def take_event(
             sine,
             motion,
             is_recorded,
-            work.force,
-            work.given[0],
-            work.speed,
-            work.active,
-            work.elimination,
+            work,
             accumulator,
         )
     if progress.wanted < 0 or progress.n_event > MOST_EVENTS:

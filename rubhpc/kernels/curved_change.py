@@ -11,7 +11,15 @@ from rubhpc.kernels.complementarity import UNSOLVED, residual_of, solve_active, 
 from rubhpc.kernels.contact_modes import Reduced
 from rubhpc.kernels.curved_contact import CurvedPairs, CurvedWork, is_closed
 from rubhpc.kernels.curved_forces import fill_geometry
-from rubhpc.kernels.mode_change import AT_REST, OPENING, hidden_flight, least_flight, observe_impact, product
+from rubhpc.kernels.mode_change import (
+    AT_REST,
+    OPENING,
+    EventWork,
+    hidden_flight,
+    least_flight,
+    observe_impact,
+    product,
+)
 
 Floats = NDArray[np.float64]
 
@@ -49,10 +57,7 @@ def change_curved(
     motion: Floats,
     is_recorded: bool,
     work: CurvedWork,
-    force: Floats,
-    speed: Floats,
-    active: NDArray[np.bool_],
-    elimination: Floats,
+    events: EventWork,
     accumulator: Accumulator,
 ) -> int:
     """Impact, then the set of pairs closed afterwards, as `mode_change.change_contacts`; -1: there is none.
@@ -62,6 +67,7 @@ def change_curved(
     q, n = reduced.gap_jacobian.shape
     candidates = (closed & ~crossing) | (crossing & ~closed)
     velocity = motion[n:]
+    force, speed, active, elimination = events.force, events.speed, events.active, events.elimination
     rate_row, force_row, delassus = work.shape[0], work.shape[1], work.matrix
     for i in range(q):
         if is_closed(candidates, i):

@@ -14,19 +14,20 @@ from rubhpc.kernels.case_progress import (
     NONE,
     UNDER_WAY,
     Clock,
+    Coordinates,
     Progress,
     shaft_turn,
 )
-from rubhpc.kernels.contact_event import MOST_EVENTS, EventWork
+from rubhpc.kernels.contact_event import MOST_EVENTS
 from rubhpc.kernels.contact_modes import FORCED_LEVEL, ModeTables, Reduced
 from rubhpc.kernels.curved_change import change_curved
 from rubhpc.kernels.curved_contact import CurvedPairs, CurvedTables, CurvedWork, is_closed
 from rubhpc.kernels.curved_measuring import place
 from rubhpc.kernels.event_steps import end_mode, record_event, record_touch
+from rubhpc.kernels.mode_change import EventWork  # noqa: TC001 - part of a kernel's signature
 
 if TYPE_CHECKING:
-    from rubhpc.kernels.accumulators import Accumulator, Samples
-    from rubhpc.kernels.sampling import Recorder
+    from rubhpc.kernels.sampling import Measured
 
 Floats = NDArray[np.float64]
 
@@ -41,23 +42,19 @@ def take_curved_event(
     crossing: int,
     is_recorded: bool,
     progress: Progress,
-    z: Floats,
-    motion: Floats,
+    coordinates: Coordinates,
     work: CurvedWork,
     events: EventWork,
-    recorder: Recorder,
-    samples: Samples,
-    accumulator: Accumulator,
+    measured: Measured,
 ) -> int:
     """Take the event of the pairs `crossing`, as `contact_event.take_event` does."""
-    mode = progress.mode
+    mode, z, motion = progress.mode, coordinates.z, coordinates.motion
+    samples, accumulator = measured.samples, measured.accumulator
     closed = int(tables.mask[mode])
     place(tables, curved, mode, z[0], z[1], work.h[0], work.rate[0], motion)
     if closed != 0:
         progress.energy_from = NONE  # energies are added step by step
-    if not end_mode(
-        tables, reduced, clock, is_recorded, progress, z, motion, events.impulse, recorder, accumulator
-    ):
+    if not end_mode(tables, reduced, clock, is_recorded, progress, coordinates, events.impulse, measured):
         return DIVERGED
     cosine, sine = shaft_turn(clock, progress.tick)
     progress.wanted = change_curved(
@@ -72,10 +69,7 @@ def take_curved_event(
         motion,
         is_recorded,
         work,
-        events.force,
-        events.speed,
-        events.active,
-        events.elimination,
+        events,
         accumulator,
     )
     if progress.wanted < 0 or progress.n_event > MOST_EVENTS:

@@ -22,6 +22,7 @@ from rubhpc.kernels.case_progress import (
     PAUSED,
     UNDER_WAY,
     Clock,
+    Coordinates,
     Progress,
     shaft_turn,
 )
@@ -59,11 +60,10 @@ from rubhpc.kernels.curved_step import follow_loads, go_on, take_step
 from rubhpc.kernels.event_loop import stand_still
 from rubhpc.kernels.event_steps import choose_step, contact_age, end_record, longest_step, sample_step
 from rubhpc.kernels.measuring import begin_span
-from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.sampling import Measured  # noqa: TC001 - part of a kernel's signature
 
 if TYPE_CHECKING:
-    from rubhpc.kernels.accumulators import Accumulator, Samples
-    from rubhpc.kernels.contact_event import EventWork
+    from rubhpc.kernels.mode_change import EventWork
 
 Floats = NDArray[np.float64]
 
@@ -82,14 +82,10 @@ def advance_curved(
     last_tick: int,
     is_recorded: bool,
     progress: Progress,
-    z: Floats,
-    z_next: Floats,
-    motion: Floats,
+    coordinates: Coordinates,
     work: CurvedWork,
     events: EventWork,
-    recorder: Recorder,
-    samples: Samples,
-    accumulator: Accumulator,
+    measured: Measured,
 ) -> int:
     """Advance a case from the tick reached to `last_tick`, as `event_loop.advance` does.
 
@@ -98,6 +94,7 @@ def advance_curved(
     tolerance : float
         Of the loads of closed contacts (`curved_step.take_step`).
     """
+    z, z_next, motion = coordinates.z, coordinates.z_next, coordinates.motion
     z_re, z_im, next_re, next_im = z[0], z[1], z_next[0], z_next[1]
     mask = tables.mask
     interval = clock.tick * (1 << clock.sample_level)
@@ -118,7 +115,7 @@ def advance_curved(
         closed = int(mask[mode])
         if is_recorded and progress.energy_from < 0:
             if closed == 0:
-                begin_span(z, progress, recorder)
+                begin_span(z, progress, measured.recorder)
             else:
                 begin_curved_span(pairs, tables, curved, clock, z, progress, work)
         is_sample = is_recorded and progress.tick == progress.next_sample << clock.sample_level
@@ -138,14 +135,12 @@ def advance_curved(
                 i_sample,
                 interval,
                 work,
-                recorder,
-                samples,
-                accumulator,
+                measured,
             )
             progress.next_sample += 1
         if is_end:
             if is_recorded and closed == 0:
-                end_record(tables, clock, is_sample, z, progress, recorder, samples, accumulator)
+                end_record(tables, clock, is_sample, z, progress, measured)
             elif is_last:
                 progress.energy_from = NONE
             return FINISHED
@@ -221,7 +216,7 @@ def advance_curved(
             groping = 0
             continue
         if is_sample and closed == 0:
-            sample_step(tables, clock, level, z_re, z_im, progress, recorder, samples, accumulator)
+            sample_step(tables, clock, level, z_re, z_im, progress, measured)
         if crossing != 0:  # an event within the next tick, or before anything moves, is taken here
             outcome = take_curved_event(
                 tables,
@@ -232,13 +227,10 @@ def advance_curved(
                 crossing,
                 is_recorded,
                 progress,
-                z,
-                motion,
+                coordinates,
                 work,
                 events,
-                recorder,
-                samples,
-                accumulator,
+                measured,
             )
             if outcome != UNDER_WAY:
                 return outcome
@@ -247,7 +239,9 @@ def advance_curved(
         if closed != 0:
             step = (1 << level) * clock.tick
             if is_recorded:
-                observe_energies(pairs, tables, curved, clock, level, z, z_next, progress, work, accumulator)
+                observe_energies(
+                    pairs, tables, curved, clock, level, z, z_next, progress, work, measured.accumulator
+                )
                 i_sample = progress.tick >> clock.sample_level
                 observe_curved_step(
                     reduced,
@@ -257,8 +251,8 @@ def advance_curved(
                     i_sample,
                     1.0 / interval,
                     work,
-                    samples,
-                    accumulator,
+                    measured.samples,
+                    measured.accumulator,
                 )
             if due >= 0:
                 groping = groping + 1 if due == 0 else 0

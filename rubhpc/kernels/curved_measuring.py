@@ -36,7 +36,7 @@ from rubhpc.kernels.curved_contact import (
 )
 from rubhpc.kernels.curved_response import move_coordinates, respond
 from rubhpc.kernels.mode_change import product
-from rubhpc.kernels.sampling import Recorder, store_samples, widen_extrema
+from rubhpc.kernels.sampling import Measured, store_samples, widen_extrema
 
 Floats = NDArray[np.float64]
 # 1e-4 of 5! / 0.0029: the error of the polynomial through the nodes by a fifth derivative within a step.
@@ -252,14 +252,13 @@ def take_curved_sample(
     i_sample: int,
     interval: float,
     work: CurvedWork,
-    recorder: Recorder,
-    samples: Samples,
-    accumulator: Accumulator,
+    measured: Measured,
 ) -> None:
     """Record a sample at the beginning of a step; the one past the record counts for extrema alone.
 
     The turn is that of the shaft (`shaft_turn`), the interval (s) that between samples.
     """
+    recorder, samples, accumulator = measured.recorder, measured.samples, measured.accumulator
     n, value = reduced.stiffness.shape[0], recorder.value
     place(tables, curved, mode, z_re, z_im, work.h[0], work.rate[0], work.state)
     cosine, sine = turn

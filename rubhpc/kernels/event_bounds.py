@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import linked_sum
+from rubhpc.kernels.contact_modes import ModeTables  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.friction_states import OPEN, state_of
 
@@ -24,14 +25,8 @@ FREE, SURE = range(2)  # rows of what is known of the switch functions
 @linked_sum
 def free_until(
     states: int,
+    tables: ModeTables,
     mode: int,
-    switch_re: Floats,
-    switch_im: Floats,
-    rate_re: Floats,
-    rate_im: Floats,
-    bend_re: Floats,
-    bend_im: Floats,
-    turn: Floats,
     z_re: Floats,
     z_im: Floats,
     now: int,
@@ -40,14 +35,12 @@ def free_until(
     longest: int,
     known: Ints,
 ) -> tuple[int, int]:
-    """How long no switch function (2 q, m) of a set of states can vanish unseen.
+    """How long no switch function of a set of states, a contact mode of the tables, can vanish unseen.
 
     Parameters
     ----------
     now : int
         Tick at which the coordinates stand; each lasts `tick` (s).
-    turn : (p, 2 q, m)
-        As in `ModeTables`: negative for coordinates that decay fast without vibration.
     shortest, longest : int
         Ticks less than which are taken for none, and beyond which none is asked for.
     known : (2, 2 q)
@@ -72,13 +65,9 @@ def free_until(
         j = first + turn_of
         j = j - n_switch if j >= n_switch else j
         if known[SURE, j] < reached and is_watched(states, j):
-            re, im, turning_re, turning_im = (
-                switch_re[mode, j],
-                switch_im[mode, j],
-                rate_re[mode, j],
-                rate_im[mode, j],
-            )
-            bending_re, bending_im, weight = bend_re[mode, j], bend_im[mode, j], turn[mode, j]
+            re, im, weight = tables.switch_re[mode, j], tables.switch_im[mode, j], tables.turn[mode, j]
+            turning_re, turning_im = tables.rate_re[mode, j], tables.rate_im[mode, j]
+            bending_re, bending_im = tables.bend_re[mode, j], tables.bend_im[mode, j]
             value, rate, bend, slow_turn = 0.0, 0.0, 0.0, 0.0
             gain, fast_rate, rise, fast_bend, fast_turn = 0.0, 0.0, 0.0, 0.0, 0.0
             for k in range(z_re.size):  # in one loop: several would wait for their sums as often

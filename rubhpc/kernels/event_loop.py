@@ -26,6 +26,7 @@ from rubhpc.kernels.case_progress import (
     PAUSED,
     UNDER_WAY,
     Clock,
+    Coordinates,
     Progress,
     Sections,
 )
@@ -49,11 +50,10 @@ from rubhpc.kernels.event_steps import (
 )
 from rubhpc.kernels.measuring import observe_step, resolved_contact
 from rubhpc.kernels.mode_change import GAP_TOLERANCE
-from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.sampling import Measured  # noqa: TC001 - part of a kernel's signature
 
 if TYPE_CHECKING:
-    from rubhpc.kernels.accumulators import Accumulator, Samples
-    from rubhpc.kernels.contact_event import EventWork
+    from rubhpc.kernels.mode_change import EventWork
 
 Floats = NDArray[np.float64]
 
@@ -68,13 +68,9 @@ def advance(
     last_tick: int,
     is_recorded: bool,
     progress: Progress,
-    z: Floats,
-    z_next: Floats,
-    motion: Floats,
+    coordinates: Coordinates,
     work: EventWork,
-    recorder: Recorder,
-    samples: Samples,
-    accumulator: Accumulator,
+    measured: Measured,
     sections: Sections,
 ) -> int:
     """Advance a case from the tick reached to `last_tick`; sample 0 is tick 0.
@@ -90,12 +86,10 @@ def advance(
     Parameters
     ----------
     is_recorded : bool
-        Whether to fill `samples` and `accumulator`.
+        Whether to fill what is `measured`.
     progress : Progress
         Where a contact mode is wanted that is not tabulated, MODE_WANTED is returned with the motion in
-        `motion` (2 n,); the caller adds the mode and calls again.
-    z, z_next : (2, m)
-        Modal coordinates, real and imaginary, and work space.
+        `coordinates`; the caller adds the mode and calls again.
     sections : Sections
         If there are any, the case goes on without a record, revolution by revolution from `last_tick` on to
         tick 0, or to the end of one at which the motion is beyond a limit.
@@ -105,7 +99,7 @@ def advance(
     int
         FINISHED, DIVERGED (at an event), CONTACT_UNSOLVED, MODE_WANTED, or PAUSED after many steps.
     """
-    # Tuples are opened here: a field read inside the loop would count a reference at every step.
+    z, z_next = coordinates.z, coordinates.z_next
     z_re, z_im, next_re, next_im = z[0], z[1], z_next[0], z_next[1]
     mask, switch_re, switch_im = tables.mask, tables.switch_re, tables.switch_im
     rate_re, rate_im, bound = tables.rate_re, tables.rate_im, tables.bound
@@ -120,15 +114,15 @@ def advance(
     while True:
         if progress.wanted >= 0 or not is_begun:
             if not begin_mode(
-                tables, reduced, clock, is_recorded, progress, z, z_next, motion, recorder, work.trail
+                tables, reduced, clock, is_recorded, progress, coordinates, measured.recorder, work.trail
             ):
                 return MODE_WANTED
             is_begun = True
         is_sample = is_recorded and progress.tick == progress.next_sample << clock.sample_level
         if progress.tick >= last_tick:
             if is_recorded:
-                end_record(tables, clock, is_sample, z, progress, recorder, samples, accumulator)
-            elif note_section(tables, reduced, clock, progress, z, accumulator, sections):
+                end_record(tables, clock, is_sample, z, progress, measured)
+            elif note_section(tables, reduced, clock, progress, z, measured.accumulator, sections):
                 last_tick += clock.samples_per_revolution << clock.sample_level
                 last_step = progress.n_step + MOST_STEPS
                 progress.halving_level, progress.is_after_event = NONE, 0
@@ -175,21 +169,10 @@ def advance(
             progress.halving_level = level - 1
             continue
         if is_sample:
-            sample_step(tables, clock, level, z_re, z_im, progress, recorder, samples, accumulator)
+            sample_step(tables, clock, level, z_re, z_im, progress, measured)
         if crossing != 0:  # an event within the next tick, or before anything moves, is taken here
             outcome = take_event(
-                tables,
-                reduced,
-                clock,
-                crossing,
-                is_recorded,
-                progress,
-                z,
-                motion,
-                work,
-                recorder,
-                samples,
-                accumulator,
+                tables, reduced, clock, crossing, is_recorded, progress, coordinates, work, measured
             )
             if outcome != UNDER_WAY:
                 return outcome
@@ -208,9 +191,7 @@ def advance(
                 z_im,
                 progress.tick >> clock.sample_level,
                 1.0 / interval,
-                recorder,
-                samples,
-                accumulator,
+                measured,
             )
         progress.tick += 1 << level
         progress.halving_level = max(progress.halving_level - 1, NONE)

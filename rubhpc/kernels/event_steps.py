@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.accumulators import observe_force
-from rubhpc.kernels.case_progress import NONE, Clock, Progress, Sections, shaft_turn
+from rubhpc.kernels.case_progress import NONE, Clock, Coordinates, Progress, Sections, shaft_turn
 from rubhpc.kernels.contact_modes import (
     FORCED_LEVEL,
     SAMPLES_AT_ONCE,
@@ -25,7 +25,7 @@ from rubhpc.kernels.contact_modes import (
 from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.measuring import end_span
 from rubhpc.kernels.mode_change import GAP_TOLERANCE
-from rubhpc.kernels.sampling import Recorder, take_samples
+from rubhpc.kernels.sampling import Measured, take_samples
 
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
@@ -122,15 +122,13 @@ def sample_step(
     z_re: Floats,
     z_im: Floats,
     progress: Progress,
-    recorder: Recorder,
-    samples: Samples,
-    accumulator: Accumulator,
+    measured: Measured,
 ) -> None:
     """Record the samples within a step, from the coordinates at its beginning, the first sample."""
     count = max(1, (1 << level) >> clock.sample_level)
     interval = clock.tick * (1 << clock.sample_level)
     first = progress.next_sample
-    take_samples(tables, progress.mode, z_re, z_im, first, count, interval, recorder, samples, accumulator)
+    take_samples(tables, progress.mode, z_re, z_im, first, count, interval, measured)
     progress.next_sample = first + count
 
 
@@ -141,13 +139,11 @@ def end_record(
     is_sample: bool,
     z: Floats,
     progress: Progress,
-    recorder: Recorder,
-    samples: Samples,
-    accumulator: Accumulator,
+    measured: Measured,
 ) -> None:
     """Close the record at its end: the last interval between samples, and the energies."""
-    if end_samples(tables, clock, is_sample, z, progress, recorder, samples, accumulator):
-        end_span(tables, clock, z, progress, recorder, accumulator)
+    if end_samples(tables, clock, is_sample, z, progress, measured):
+        end_span(tables, clock, z, progress, measured)
 
 
 @linked_sum
@@ -157,27 +153,14 @@ def end_samples(
     is_sample: bool,
     z: Floats,
     progress: Progress,
-    recorder: Recorder,
-    samples: Samples,
-    accumulator: Accumulator,
+    measured: Measured,
 ) -> bool:
     """Close the last interval between samples; returns whether the record ends at the current tick."""
     is_end = progress.tick == clock.n_sample << clock.sample_level
     if is_end and is_sample:
         count = clock.n_sample + 1 - progress.next_sample
         interval = clock.tick * (1 << clock.sample_level)
-        take_samples(
-            tables,
-            progress.mode,
-            z[0],
-            z[1],
-            clock.n_sample,
-            count,
-            interval,
-            recorder,
-            samples,
-            accumulator,
-        )
+        take_samples(tables, progress.mode, z[0], z[1], clock.n_sample, count, interval, measured)
     return bool(is_end)
 
 
@@ -217,18 +200,16 @@ def leave_mode(
     clock: Clock,
     is_recorded: bool,
     progress: Progress,
-    z: Floats,
-    motion: Floats,
+    coordinates: Coordinates,
     impulse: Floats,
-    recorder: Recorder,
-    accumulator: Accumulator,
+    measured: Measured,
 ) -> bool:
-    """Leave the contact mode at an event: fill the reduced motion (2 n,) and the `impulse` (q,), N s, so far.
+    """Leave the contact mode at an event: fill the reduced motion and the `impulse` (q,), N s, so far.
 
     Returns False where the motion diverges.
     """
-    leave(tables, progress.mode, z, motion)
-    return end_mode(tables, reduced, clock, is_recorded, progress, z, motion, impulse, recorder, accumulator)
+    leave(tables, progress.mode, coordinates.z, coordinates.motion)
+    return end_mode(tables, reduced, clock, is_recorded, progress, coordinates, impulse, measured)
 
 
 @linked_sum
@@ -238,20 +219,18 @@ def end_mode(
     clock: Clock,
     is_recorded: bool,
     progress: Progress,
-    z: Floats,
-    motion: Floats,
+    coordinates: Coordinates,
     impulse: Floats,
-    recorder: Recorder,
-    accumulator: Accumulator,
+    measured: Measured,
 ) -> bool:
-    """Continue after `leave_mode` has filled the motion; `z` are the coordinates at the end of the span."""
+    """Continue after `leave_mode` has filled the motion, with the coordinates at the end of the span."""
     count_event(clock, progress)
-    if is_beyond(reduced, motion):
+    if is_beyond(reduced, coordinates.motion):
         return False
     if is_recorded:
-        end_span(tables, clock, z, progress, recorder, accumulator)
+        end_span(tables, clock, coordinates.z, progress, measured)
         for i in range(impulse.size):
-            impulse[i] = accumulator.impulse[i]
+            impulse[i] = measured.accumulator.impulse[i]
     return True
 
 

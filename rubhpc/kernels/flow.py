@@ -55,11 +55,30 @@ class PieceRoom(Struct):
     switch: Floats  # (4, s), switch functions and their rates before and after a step
     roots: Floats  # (s,)
     ahead: Floats  # (2, m)
+    coordinates: Floats  # (2, 2, m), at the beginning of the piece, and at its end
+
+
+class Timing(Struct):
+    """Times of revolutions that are followed, and how finely they are."""
+
+    spin: float  # rad/s
+    tick: float  # s
+    search_level: int  # steps up to 2^level ticks need no bound
+    longest_level: int  # of steps
+    begin: float  # s after the shaft's angle 0, where each revolution begins
+    end: float  # s
+    moment: float  # s, as in `mode_change.change_contacts`
+    most_events: int  # in a revolution
 
 
 def piece_room(n_switch: int, width: int) -> PieceRoom:
     """Work space for pieces with so many switch functions and coordinates."""
-    return PieceRoom(np.zeros((4, n_switch)), np.zeros(n_switch), np.zeros((2, width)))
+    return PieceRoom(
+        switch=np.zeros((4, n_switch)),
+        roots=np.zeros(n_switch),
+        ahead=np.zeros((2, width)),
+        coordinates=np.empty((2, 2, width)),
+    )
 
 
 BEFORE, RATE_BEGUN, RATE_ENDED, GRADIENT = range(4)  # rows of the motions of a piece
@@ -69,19 +88,14 @@ BEFORE, RATE_BEGUN, RATE_ENDED, GRADIENT = range(4)  # rows of the motions of a 
 def follow_piece(
     tables: PieceTables,
     room: PieceRoom,
+    timing: Timing,
     motion: Floats,
     begin: float,
-    spin: float,
-    tick: float,
-    search_level: int,
-    longest_level: int,
-    duration: float,
-    coordinates: Floats,
     motions: Floats,
     rates: Floats,
     least: Floats,
 ) -> tuple[float, int]:
-    """Follow a motion in a contact mode until a switch function falls below its floor, or for `duration`.
+    """Follow a motion in a contact mode until a switch function falls below its floor, or to `timing.end`.
 
     Steps are chosen as in `event_loop.advance`. Within the last tick Newton's method finds the root, with
     exact exponentials.
@@ -90,12 +104,6 @@ def follow_piece(
     ----------
     motion : (2 n,)
         Reduced displacements and velocities at the beginning, `begin` (s) after the shaft's angle 0.
-    spin : float, rad/s
-    tick, duration : float, s
-    search_level, longest_level : int
-        Steps up to 2^level ticks need no bound; none is longer than 2^longest_level.
-    coordinates : (2, 2, m)
-        Filled in: coordinates at the beginning, and at the end.
     motions : (4, 2 n)
         Filled in: motion at the end before the event, its rate at the beginning and at the end, and the
         gradient of the first switch function that vanishes, by the motion (unchanged where none vanishes).
@@ -109,11 +117,11 @@ def follow_piece(
     float
         Time passed, s.
     int
-        Bits of the switch functions that vanish; 0 where `duration` has passed; -1 at an event beyond the
-        limit of displacements.
+        Bits of the switch functions that vanish; 0 at the end; -1 at an event beyond the limit of
+        displacements.
     """
-    entered, ended = coordinates[0], coordinates[1]
-    cosine, sine = np.cos(spin * begin), np.sin(spin * begin)
+    entered, ended = room.coordinates[0], room.coordinates[1]
+    cosine, sine = np.cos(timing.spin * begin), np.sin(timing.spin * begin)
     for part in range(2):
         rows = tables.enter_re if part == 0 else tables.enter_im
         target, offset = entered[part], tables.offset[part]
@@ -124,14 +132,12 @@ def follow_piece(
             source = rows[row]
             for k in range(target.size):
                 target[k] += source[k] * value
-    time, crossing = next_event(
-        tables, room, tick, search_level, longest_level, duration, entered, ended, least
-    )
+    time, crossing = next_event(tables, room, timing, timing.end - begin, least)
     shape_re, shape_im = tables.shape_re, tables.shape_im
     for row in range(motion.size):
         motions[BEFORE, row] = dot(shape_re[row], shape_im[row], ended[0], ended[1])
     for place in range(2):
-        z, change = coordinates[place], room.ahead
+        z, change = room.coordinates[place], room.ahead
         for k in range(z.shape[1]):
             growth, turning = tables.exponent[0, k], tables.exponent[1, k]
             change[0, k] = growth * z[0, k] - turning * z[1, k] + tables.drift[k]
@@ -159,15 +165,13 @@ def follow_piece(
 def next_event(
     tables: PieceTables,
     room: PieceRoom,
-    tick: float,
-    search_level: int,
-    longest_level: int,
+    timing: Timing,
     duration: float,
-    z_entered: Floats,
-    z: Floats,
     least: Floats,
 ) -> tuple[float, int]:
-    """Find the first event after the coordinates (2, m) `z_entered`, as `follow_piece`; `z` is filled in."""
+    """Find the first event within a duration (s) from `room.coordinates[0]` on; fills in those at its end."""
+    tick, search_level, longest_level = timing.tick, timing.search_level, timing.longest_level
+    z_entered, z = room.coordinates[0], room.coordinates[1]
     switch_re, switch_im = tables.switch_re, tables.switch_im
     rate_re, rate_im = tables.rate_re, tables.rate_im
     bound, floor, exponent, drift = tables.bound, tables.floor, tables.exponent, tables.drift

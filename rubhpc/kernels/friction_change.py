@@ -6,12 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_sum, linked, linked_sum
-from rubhpc.kernels.accumulators import PRESSING, Accumulator, Samples
+from rubhpc.kernels.accumulators import PRESSING, Accumulator
 from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
     DIVERGED,
     UNDER_WAY,
     Clock,
+    Coordinates,
     Progress,
     shaft_turn,
 )
@@ -30,7 +31,7 @@ from rubhpc.kernels.friction_events import (
     see_pairs,
 )
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, FrictionBodies, state_of
-from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.sampling import Measured  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.soft_friction_events import press_pairs
 from rubhpc.kernels.trail import note_after, note_event
 
@@ -49,22 +50,20 @@ def take_change(
     crossing: int,
     is_recorded: bool,
     progress: Progress,
-    z: Floats,
-    motion: Floats,
+    coordinates: Coordinates,
     work: FrictionWork,
-    recorder: Recorder,
-    samples: Samples,
-    accumulator: Accumulator,
+    measured: Measured,
 ) -> int:
-    """Take the event of the switch functions `crossing`: what it makes of `motion`, and the states wanted.
+    """Take the event of the switch functions `crossing`: what it makes of the motion, and the states wanted.
 
     Returns
     -------
     int
         UNDER_WAY, DIVERGED or CONTACT_UNSOLVED.
     """
+    motion, accumulator = coordinates.motion, measured.accumulator
     count_event(clock, progress)
-    leave(tables, progress.mode, z, motion)
+    leave(tables, progress.mode, coordinates.z, motion)
     if is_beyond(reduced, motion):
         return DIVERGED
     if is_recorded:
@@ -79,8 +78,8 @@ def take_change(
         interval = clock.tick * (1 << clock.sample_level)
         for i in range(work.impulse.size):
             gained = accumulator.impulse[i] - work.impulse[i]
-            samples.force[i, progress.tick >> clock.sample_level] += gained / interval
-            recorder.given[i] = gained
+            measured.samples.force[i, progress.tick >> clock.sample_level] += gained / interval
+            measured.recorder.given[i] = gained
             if wanted >= 0:
                 record_touch(i, state_of(wanted, i) != OPEN, accumulator)
     note_event(work.trail, progress.tick, crossing)

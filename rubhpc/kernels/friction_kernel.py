@@ -16,13 +16,13 @@ from rubhpc.kernels.friction_loop import advance_with_friction
 from rubhpc.kernels.friction_pieces import advance_friction_pieces
 
 if TYPE_CHECKING:
-    from rubhpc.kernels.accumulators import Accumulator, Samples
-    from rubhpc.kernels.case_progress import Clock, Progress, Sections
+    from rubhpc.kernels.accumulators import Accumulator
+    from rubhpc.kernels.case_progress import Clock, Coordinates, Progress, Sections
     from rubhpc.kernels.contact_modes import ModeTables, Reduced
     from rubhpc.kernels.event_forces import FrictionWork
     from rubhpc.kernels.friction_states import FrictionBodies
     from rubhpc.kernels.pieces import Pieces
-    from rubhpc.kernels.sampling import Recorder
+    from rubhpc.kernels.sampling import Measured
 
 Floats = NDArray[np.float64]
 
@@ -38,13 +38,9 @@ def advance_friction(
     pieces: Pieces,
     sums: Accumulator,
     progress: Progress,
-    z: Floats,
-    z_next: Floats,
-    motion: Floats,
+    coordinates: Coordinates,
     work: FrictionWork,
-    recorder: Recorder,
-    samples: Samples,
-    accumulator: Accumulator,
+    measured: Measured,
     sections: Sections,
 ) -> int:
     """Advance a case through `pieces` if there are any, else to `last_tick` or by `sections`.
@@ -63,10 +59,18 @@ def advance_friction(
     """
     if pieces.spin.size > 0:
         return advance_friction_pieces(
-            tables, reduced, bodies, clock, pieces, progress, z, z_next, motion, work, recorder, samples,
-            sums, sections,
-        )  # fmt: skip
+            tables, reduced, bodies, clock, pieces, progress, coordinates, work, measured, sums, sections
+        )
     return advance_with_friction(
-        tables, reduced, bodies, clock, last_tick, is_recorded, progress, z, z_next, motion, work, recorder,
-        samples, accumulator, sections,
-    )  # fmt: skip
+        tables,
+        reduced,
+        bodies,
+        clock,
+        last_tick,
+        is_recorded,
+        progress,
+        coordinates,
+        work,
+        measured,
+        sections,
+    )

@@ -8,8 +8,6 @@ for each pair that sticks, the displacement along its rim, which grows linearly:
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,6 +20,7 @@ from rubhpc.kernels.case_progress import (
     PAUSED,
     UNDER_WAY,
     Clock,
+    Coordinates,
     Progress,
     Sections,
 )
@@ -36,11 +35,8 @@ from rubhpc.kernels.friction_events import observe_states
 from rubhpc.kernels.friction_measuring import observe_span
 from rubhpc.kernels.friction_states import FrictionBodies, stuck_pairs
 from rubhpc.kernels.measuring import begin_span
-from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.sampling import Measured  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.trail import note_piece
-
-if TYPE_CHECKING:
-    from rubhpc.kernels.accumulators import Accumulator, Samples
 
 Floats = NDArray[np.float64]
 
@@ -56,13 +52,9 @@ def advance_with_friction(
     last_tick: int,
     is_recorded: bool,
     progress: Progress,
-    z: Floats,
-    z_next: Floats,
-    motion: Floats,
+    coordinates: Coordinates,
     work: FrictionWork,
-    recorder: Recorder,
-    samples: Samples,
-    accumulator: Accumulator,
+    measured: Measured,
     sections: Sections,
 ) -> int:
     """Advance a case from the tick reached to `last_tick`, as `event_loop.advance` does.
@@ -73,12 +65,11 @@ def advance_with_friction(
     -------
     int
         FINISHED, DIVERGED (at an event), MODE_WANTED, PAUSED, or CONTACT_UNSOLVED with the motion in
-        `motion`: no forces obey the laws, or events follow one another without end.
+        `coordinates`: no forces obey the laws, or events follow one another without end.
     """
-    # Tuples are opened here: a field read inside the loop would count a reference at every step.
+    z, z_next, motion = coordinates.z, coordinates.z_next, coordinates.motion
     mask, switch_re, switch_im = tables.mask, tables.switch_re, tables.switch_im
     rate_re, rate_im = tables.rate_re, tables.rate_im
-    bend_re, bend_im, turn = tables.bend_re, tables.bend_im, tables.turn
     power_re, power_im, n_eigenmode = tables.power_re, tables.power_im, tables.n_eigenmode
     rim_speed, overlap = bodies.rim_speed, reduced.overlap
     highest_level = power_re.shape[1] - 1
@@ -101,9 +92,9 @@ def advance_with_friction(
             used = used_width(tables, progress.mode)
             z_re, z_im, next_re, next_im = z[0, :used], z[1, :used], z_next[0, :used], z_next[1, :used]
             if is_recorded:
-                observe_states(mask[progress.mode], accumulator)
+                observe_states(mask[progress.mode], measured.accumulator)
         if is_recorded and progress.energy_from < 0:
-            begin_span(z, progress, recorder)
+            begin_span(z, progress, measured.recorder)
         is_over, crossing = progress.tick >= last_tick, int(np.int64(0))
         if not is_over:
             is_at_event = progress.is_after_event == 1 or progress.halving_level >= 0
@@ -117,14 +108,8 @@ def advance_with_friction(
             if not is_at_event and progress.tick >= renewed_at and progress.tick + (1 << longest) > sure_to:
                 free_to, sure_to = free_until(
                     states,
+                    tables,
                     mode,
-                    switch_re,
-                    switch_im,
-                    rate_re,
-                    rate_im,
-                    bend_re,
-                    bend_im,
-                    turn,
                     z_re,
                     z_im,
                     progress.tick,
@@ -199,22 +184,19 @@ def advance_with_friction(
                 crossing,
                 is_recorded,
                 progress,
-                z,
-                motion,
+                coordinates,
                 work,
-                recorder,
-                samples,
-                accumulator,
+                measured,
             )
         if is_recorded:
             n_sample = (progress.tick >> clock.sample_level) - (progress.energy_from >> clock.sample_level)
             if is_over or crossing != 0 or n_sample >= LONGEST:
-                observe_span(tables, bodies, clock, z, progress, recorder, samples, accumulator)
+                observe_span(tables, bodies, clock, z, progress, measured)
         if is_over:
             if is_recorded:
                 is_sample = progress.tick == progress.next_sample << clock.sample_level
-                end_samples(tables, clock, is_sample, z, progress, recorder, samples, accumulator)
-            elif note_section(tables, reduced, clock, progress, z, accumulator, sections):
+                end_samples(tables, clock, is_sample, z, progress, measured)
+            elif note_section(tables, reduced, clock, progress, z, measured.accumulator, sections):
                 last_tick += clock.samples_per_revolution << clock.sample_level
                 last_step = progress.n_step + MOST_STEPS
                 progress.halving_level, progress.is_after_event = NONE, 0

@@ -5,8 +5,6 @@ It is one linear piece of a motion, so that nothing is measured step by step.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,11 +18,8 @@ from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, Frict
 from rubhpc.kernels.friction_work import rub_through
 from rubhpc.kernels.measuring import end_span
 from rubhpc.kernels.peak_search import follow_force, recent_impulse
-from rubhpc.kernels.sampling import Recorder, take_samples
+from rubhpc.kernels.sampling import Measured, take_samples
 from rubhpc.kernels.span_forces import RUBBED, begin_force, pass_force
-
-if TYPE_CHECKING:
-    from rubhpc.kernels.accumulators import Accumulator, Samples
 
 Floats = NDArray[np.float64]
 
@@ -36,16 +31,15 @@ def observe_span(
     clock: Clock,
     z: Floats,
     progress: Progress,
-    recorder: Recorder,
-    samples: Samples,
-    accumulator: Accumulator,
+    measured: Measured,
 ) -> None:
     """Measure the span from `progress.energy_from` to now, at coordinates (2, m); none is under way then."""
+    recorder, accumulator = measured.recorder, measured.accumulator
     mode, begin, end, given = progress.mode, progress.energy_from, progress.tick, recorder.given
-    end_span(tables, clock, z, progress, recorder, accumulator)
+    end_span(tables, clock, z, progress, measured)
     if end > begin:
-        pass_parts(tables, bodies, clock, begin, z, progress, recorder, samples, accumulator)
-        add_rubs(tables, bodies, clock, mode, end - begin, z, recorder, accumulator)
+        pass_parts(tables, bodies, clock, begin, z, progress, measured)
+        add_rubs(tables, bodies, clock, mode, end - begin, z, measured)
     for i in range(given.size):
         if given[i] != 0.0:
             observe_force(i, end * clock.tick, 0.0, given[i], 0.0, 0.0, accumulator)
@@ -60,14 +54,13 @@ def pass_parts(
     begin: int,
     z: Floats,
     progress: Progress,
-    recorder: Recorder,
-    samples: Samples,
-    accumulator: Accumulator,
+    measured: Measured,
 ) -> None:
     """Read the samples of the span, and the forces in the parts between them.
 
     Samples are read one by one, or ahead while no pair is closed.
     """
+    recorder, samples, accumulator = measured.recorder, measured.samples, measured.accumulator
     mode, end, level = progress.mode, progress.tick, clock.sample_level
     states, interval, at_once = tables.mask[mode], clock.tick * (1 << level), 1
     if states == 0:
@@ -83,9 +76,7 @@ def pass_parts(
         sample, following = now >> level, (now >> level) + 1
         if now == sample << level and sample >= progress.next_sample:
             count = min(at_once, ((end - 1) >> level) + 1 - sample)
-            take_samples(
-                tables, mode, here[0], here[1], sample, count, interval, recorder, samples, accumulator
-            )
+            take_samples(tables, mode, here[0], here[1], sample, count, interval, measured)
             following = progress.next_sample = sample + count
         stop, there = min(end, following << level), z
         if stop < end:
@@ -94,7 +85,7 @@ def pass_parts(
         for i in range(bodies.rim_speed.size):
             if state_of(states, i) != OPEN:
                 impulse = pass_part(
-                    tables, bodies, clock, mode, i, begin, now, stop, end, here, there, recorder, accumulator
+                    tables, bodies, clock, mode, i, begin, now, stop, end, here, there, measured
                 )
                 samples.force[i, sample] += impulse / interval
                 accumulator.impulse[i] += impulse
@@ -114,10 +105,10 @@ def pass_part(
     end: int,
     here: Floats,
     there: Floats,
-    recorder: Recorder,
-    accumulator: Accumulator,
+    measured: Measured,
 ) -> float:
     """Add the force of closed pair i between two ticks, from `now` to `stop`, of a span; its impulse, N s."""
+    recorder, accumulator = measured.recorder, measured.accumulator
     near = int(AVERAGING_TIME / clock.tick) + 1
     before, after, impulse, most = pass_force(
         tables,
@@ -137,9 +128,7 @@ def pass_part(
         # A mean over an impact has its impulse too: the force is followed near that.
         calm_from = stop if is_high else now + near * (hit > 0.0)
         calm_to = stop - near * (hits > 0.0)
-        follow_force(
-            tables, bodies, clock, mode, i, begin, now, stop, calm_from, calm_to, here, recorder, accumulator
-        )
+        follow_force(tables, bodies, clock, mode, i, begin, now, stop, calm_from, calm_to, here, measured)
     else:
         observe_force(i, time, (stop - now) * clock.tick, impulse, before, after, accumulator)
     return impulse
@@ -153,14 +142,14 @@ def add_rubs(
     mode: int,
     n_tick: int,
     z: Floats,
-    recorder: Recorder,
-    accumulator: Accumulator,
+    measured: Measured,
 ) -> None:
     """Add times of contact, slips and works of friction in the span of `n_tick` ticks that ends with `z`.
 
     Of drive and friction together the damping of the tables knows the work in closed form, and counts it as
     its own: what is added to them here is taken off there.
     """
+    recorder, accumulator = measured.recorder, measured.accumulator
     time = n_tick * clock.tick
     for i in range(bodies.rim_speed.size):
         state, rubbed = state_of(tables.mask[mode], i), recorder.pair[i, RUBBED]

@@ -14,6 +14,7 @@ from rubhpc.kernels.case_progress import (
     FINISHED,
     MODE_WANTED,
     Clock,
+    Coordinates,
     Progress,
     Sections,
 )
@@ -49,10 +50,10 @@ from rubhpc.kernels.pieces import (
     set_masks,
     start_piece,
 )
+from rubhpc.kernels.sampling import Measured
 
 if TYPE_CHECKING:
-    from rubhpc.kernels.accumulators import Accumulator, Samples
-    from rubhpc.kernels.sampling import Recorder
+    from rubhpc.kernels.accumulators import Accumulator
 
 Floats = NDArray[np.float64]
 
@@ -68,12 +69,9 @@ def advance_friction_pieces(
     clock: Clock,
     pieces: Pieces,
     progress: Progress,
-    z: Floats,
-    z_next: Floats,
-    motion: Floats,
+    coordinates: Coordinates,
     work: FrictionWork,
-    recorder: Recorder,
-    samples: Samples,
+    measured: Measured,
     sums: Accumulator,
     sections: Sections,
 ) -> int:
@@ -88,6 +86,7 @@ def advance_friction_pieces(
         CONTACT_UNSOLVED too where no states go on from its beginning.
     """
     is_recorded = bool(np.bool_(True))  # no literal: the loop is compiled for one type
+    recorder, samples, z = measured.recorder, measured.samples, coordinates.z
     at, n_part = pieces.at, pieces.n_sample // pieces.n_part_sample
     while at[PIECE] < pieces.spin.size:
         piece = at[PIECE]
@@ -125,13 +124,9 @@ def advance_friction_pieces(
                 last_tick,
                 is_recorded,
                 progress,
-                z,
-                z_next,
-                motion,
+                coordinates,
                 work,
-                recorder,
-                samples,
-                part,
+                Measured(recorder, samples, part),
                 sections,
             )
             if outcome != FINISHED:

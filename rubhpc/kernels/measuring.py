@@ -9,8 +9,6 @@ from rubhpc.kernels._jit import jit_sum, linked_sum
 from rubhpc.kernels.accumulators import (
     DAMPING_LOSS,
     UNBALANCE_WORK,
-    Accumulator,
-    Samples,
     observe_force,
     observe_rub,
     observe_sense,
@@ -26,7 +24,7 @@ from rubhpc.kernels.contact_modes import (
     resolved_time,
     used_width,
 )
-from rubhpc.kernels.sampling import Recorder  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.sampling import Measured, Recorder  # noqa: TC001 - part of a kernel's signature
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -108,9 +106,7 @@ def observe_step(
     z_im: Floats,
     i_sample: int,
     share: float,
-    recorder: Recorder,
-    samples: Samples,
-    accumulator: Accumulator,
+    measured: Measured,
 ) -> None:
     """Add a step (s) of the closed pairs: force and slip as cubics, Simpson's rule for friction.
 
@@ -118,6 +114,7 @@ def observe_step(
     to the mean force of sample `i_sample`. `end_span` has the exact work of drive and friction together in
     closed form, as part of that of damping: it subtracts what is added here.
     """
+    recorder, samples, accumulator = measured.recorder, measured.samples, measured.accumulator
     for i in range(reduced.radius.size):
         if not (tables.mask[mode] >> i) & 1:
             continue
@@ -215,8 +212,7 @@ def end_span(
     clock: Clock,
     z: Floats,
     progress: Progress,
-    recorder: Recorder,
-    accumulator: Accumulator,
+    measured: Measured,
 ) -> None:
     """Add damping loss and unbalance work since the span began, in one contact mode throughout.
 
@@ -224,6 +220,7 @@ def end_span(
     """
     if progress.energy_from < 0:
         return
+    recorder, accumulator = measured.recorder, measured.accumulator
     mode, gained = progress.mode, recorder.gained
     time = (progress.tick - progress.energy_from) * clock.tick
     energies_gained(tables, mode, recorder.begun, z, gained)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_sum, linked_sum
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.accumulators import (
     IMPACT,
     IMPACT_LOSS,
@@ -16,6 +17,7 @@ from rubhpc.kernels.accumulators import (
 )
 from rubhpc.kernels.complementarity import UNSOLVED, residual_of, solve_active, solve_complementarity
 from rubhpc.kernels.contact_modes import Reduced  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.trail import Trail, no_trail
 
 Floats = NDArray[np.float64]
 
@@ -24,6 +26,31 @@ AT_REST = 1e-12  # m/s, of gaps that stay closed
 GAP_TOLERANCE = 1e-14  # m, of overlap, above which a gap has closed
 HIDDEN = 8.0 * GAP_TOLERANCE  # m, first speed squared over deceleration of a flight four tolerances high
 SUSTAINED = 0.08  # the same over the overlap that followed modes may leave as a pair opens
+
+
+class EventWork(Struct):
+    """Work space of an event, q pairs."""
+
+    force: Floats  # (q,)
+    given: Floats  # (2, q), normal impulses of the event, N s, and tractions, which none has
+    speed: Floats  # (q,)
+    impulse: Floats  # (q,), accumulated before the event, N s
+    active: NDArray[np.bool_]  # (q,)
+    elimination: Floats  # (q, q + 1)
+    trail: Trail  # of the motion
+
+
+def event_work(q: int) -> EventWork:
+    """Work space of the events of q pairs, without a trail."""
+    return EventWork(
+        force=np.zeros(q),
+        given=np.zeros((2, q)),
+        speed=np.zeros(q),
+        impulse=np.zeros(q),
+        active=np.zeros(q, dtype=np.bool_),
+        elimination=np.zeros((q, q + 1)),
+        trail=no_trail(),
+    )
 
 
 @linked_sum
@@ -68,20 +95,17 @@ def change_contacts(
     sine: float,
     motion: Floats,
     is_recorded: bool,
-    force: Floats,
-    given: Floats,
-    speed: Floats,
-    active: NDArray[np.bool_],
-    elimination: Floats,
+    work: EventWork,
     accumulator: Accumulator,
 ) -> int:
     """Impact, then the set of pairs closed afterwards; -1 where there is none.
 
     `closed` are the pairs closed before, `crossing` those whose gap closes or whose force vanishes now. Every
     candidate that closes rebounds with its restitution (0: inelastic). Among those that do not part for
-    longer than `moment` (s), the accelerations decide. Fills the impulses `given` (q,), N s.
+    longer than `moment` (s), the accelerations decide. Fills the impulses `work.given`.
     """
     q, n = reduced.gap_jacobian.shape
+    force, given, speed, active = work.force, work.given[0], work.speed, work.active
     hidden = hidden_flight(reduced)
     candidates = (closed & ~crossing) | (crossing & ~closed)
     velocity = motion[n:]
@@ -91,7 +115,7 @@ def change_contacts(
         active[i] = speed[i] < 0.0
         if active[i]:
             speed[i] *= 1.0 + reduced.restitution
-    pivots = solve_complementarity(reduced.delassus, speed, 1e-14, force, active, elimination)
+    pivots = solve_complementarity(reduced.delassus, speed, 1e-14, force, active, work.elimination)
     if pivots == UNSOLVED:
         return -1
     if is_recorded:
@@ -120,7 +144,7 @@ def change_contacts(
             if product(reduced.gap_jacobian[i], velocity) <= OPENING + max(-acceleration, 0.0) * time:
                 speed[i] = acceleration
         active[i] = speed[i] < 0.0
-    pivots = solve_complementarity(reduced.delassus, speed, 1e-12, force, active, elimination)
+    pivots = solve_complementarity(reduced.delassus, speed, 1e-12, force, active, work.elimination)
     if pivots == UNSOLVED:
         return -1
     if is_recorded:
@@ -137,7 +161,7 @@ def change_contacts(
         elif is_recorded and reduced.restitution > 0.0 and (crossing & ~closed) >> i & 1:
             accumulator.n_contact[i] += 1  # it bounces
     if parts > AT_REST:  # where it parts for a moment, the impulse that closes it again is missing
-        if not solve_active(reduced.delassus, speed, active, force, elimination):
+        if not solve_active(reduced.delassus, speed, active, force, work.elimination):
             return -1
         for i in range(q):
             if active[i]:

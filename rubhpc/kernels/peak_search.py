@@ -19,7 +19,7 @@ from rubhpc.kernels.friction_work import gains
 if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator
     from rubhpc.kernels.case_progress import Clock
-    from rubhpc.kernels.sampling import Recorder
+    from rubhpc.kernels.sampling import Measured
 
 Floats = NDArray[np.float64]
 
@@ -77,15 +77,14 @@ def follow_force(
     calm_from: int,
     calm_to: int,
     z: Floats,
-    recorder: Recorder,
-    accumulator: Accumulator,
+    measured: Measured,
 ) -> None:
     """Add the force of closed pair i between two ticks of a span, at the first of them with `z` (2, m).
 
     What an event sets off is fast at first: no piece but the first is longer than the contact mode has
     lasted. From `calm_from` to `calm_to` pieces are long.
     """
-    at, ahead = recorder.path[2], recorder.path[3]
+    at, ahead = measured.recorder.path[2], measured.recorder.path[3]
     copy_coordinates(z, at)
     copy_coordinates(z, ahead)
     first = int(FIRST * AVERAGING_TIME / clock.tick) + 1
@@ -105,7 +104,7 @@ def follow_force(
         time = count * clock.tick
         gained, other = gains(tables, mode, i, time, at, ahead)
         impulse = share * (gained + other) if is_stuck else gained
-        observe_force(i, now * clock.tick, time, impulse, before, after, accumulator)
+        observe_force(i, now * clock.tick, time, impulse, before, after, measured.accumulator)
         before, now = after, now + count
         at, ahead = ahead, at
 

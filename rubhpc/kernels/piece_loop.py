@@ -8,7 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_sum, linked_sum
-from rubhpc.kernels.case_progress import DIVERGED, FINISHED, MODE_WANTED, Clock, Progress, Sections
+from rubhpc.kernels.case_progress import (
+    DIVERGED,
+    FINISHED,
+    MODE_WANTED,
+    Clock,
+    Coordinates,
+    Progress,
+    Sections,
+)
 from rubhpc.kernels.contact_modes import ModeTables, Reduced, dot
 from rubhpc.kernels.event_loop import advance
 from rubhpc.kernels.penalty_events import pressed_pairs
@@ -29,11 +37,10 @@ from rubhpc.kernels.pieces import (
     set_masks,
     start_piece,
 )
+from rubhpc.kernels.sampling import Measured
 
 if TYPE_CHECKING:
-    from rubhpc.kernels.accumulators import Accumulator, Samples
-    from rubhpc.kernels.contact_event import EventWork
-    from rubhpc.kernels.sampling import Recorder
+    from rubhpc.kernels.mode_change import EventWork
 
 Floats = NDArray[np.float64]
 
@@ -45,13 +52,9 @@ def advance_pieces(
     clock: Clock,
     pieces: Pieces,
     progress: Progress,
-    z: Floats,
-    z_next: Floats,
-    motion: Floats,
+    coordinates: Coordinates,
     work: EventWork,
-    recorder: Recorder,
-    samples: Samples,
-    sums: Accumulator,
+    measured: Measured,
     sections: Sections,
 ) -> int:
     """Advance a case through pieces, from `pieces.at` on, and record every sample.
@@ -64,10 +67,9 @@ def advance_pieces(
         Its unbalance and rim speeds are set.
     clock : Clock
         Of any piece; `n_sample` is that of all.
-    samples : Samples
-        Of one piece.
-    sums : Accumulator
-        (1 + k c, ...) each: of the time before, then of every part of the pieces, zero on entry.
+    measured : Measured
+        Samples of one piece, and sums (1 + k c, ...): of the time before, then of every part of the pieces,
+        zero on entry.
     sections : Sections
         None.
 
@@ -77,6 +79,8 @@ def advance_pieces(
         FINISHED, or the outcome of `event_loop.advance` in the current piece. MODE_WANTED requests the set
         `progress.wanted`, tuned to that piece and those after it.
     """
+    recorder, samples, sums = measured.recorder, measured.samples, measured.accumulator
+    z = coordinates.z
     at, n_part = pieces.at, pieces.n_sample // pieces.n_part_sample
     while at[PIECE] < pieces.spin.size:
         piece = at[PIECE]
@@ -103,13 +107,9 @@ def advance_pieces(
                 last_tick,
                 True,
                 progress,
-                z,
-                z_next,
-                motion,
+                coordinates,
                 work,
-                recorder,
-                samples,
-                part,
+                Measured(recorder, samples, part),
                 sections,
             )
             if outcome != FINISHED:

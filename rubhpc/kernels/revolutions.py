@@ -9,8 +9,8 @@ from rubhpc.kernels._jit import jit_sum
 from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.accumulators import Accumulator  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.contact_modes import Reduced, find_mode
-from rubhpc.kernels.flow import BEFORE, PieceRoom, PieceTables, follow_piece
-from rubhpc.kernels.mode_change import change_contacts
+from rubhpc.kernels.flow import BEFORE, PieceRoom, PieceTables, Timing, follow_piece
+from rubhpc.kernels.mode_change import EventWork, change_contacts
 from rubhpc.kernels.penalty_events import change_pressed
 
 Floats = NDArray[np.float64]
@@ -60,6 +60,25 @@ class PieceRows(Struct):
     given: Floats  # (k, 2, q), normal and tangential impulses of the event, N s
 
 
+class Passage(Struct):
+    """How far a motion has been followed; all changes in place."""
+
+    reached: Ints  # (4,), pieces filled in, states of the pairs, revolution, and pieces before that
+    passed: Floats  # (1,), s, time reached in the revolution
+    motion: Floats  # (2 n,)
+
+
+def new_passage(width: int) -> Passage:
+    """Arrays for motions of this width (2 n)."""
+    return Passage(reached=np.zeros(4, dtype=np.int64), passed=np.zeros(1), motion=np.zeros(width))
+
+
+def begin_passage(passage: Passage, motion: Floats, states: int, begin: float) -> None:
+    """Begin with a motion (2 n,) and the pairs in these states, a time (s) after the shaft's angle 0."""
+    passage.reached[:] = 0, states, 0, 0
+    passage.passed[0], passage.motion[:] = begin, motion
+
+
 def piece_rows(k: int, width: int, n_switch: int, q: int) -> PieceRows:
     """Arrays for k pieces of motions of this width (2 n) with q pairs."""
     return PieceRows(
@@ -76,53 +95,29 @@ def follow_revolutions(
     modes: PieceModes,
     reduced: Reduced,
     room: PieceRoom,
-    coordinates: Floats,
-    spin: float,
-    tick: float,
-    search_level: int,
-    longest_level: int,
-    begin: float,
-    end: float,
-    moment: float,
+    timing: Timing,
     takes_events: bool,
-    most_events: int,
-    reached: Ints,
-    passed: Floats,
-    motion: Floats,
+    passage: Passage,
     rows: PieceRows,
     least: Floats,
-    force: Floats,
-    speed: Floats,
-    active: Flags,
-    elimination: Floats,
+    work: EventWork,
     accumulator: Accumulator,
 ) -> int:
     """Follow a motion from one event to the next through several revolutions.
 
     Parameters
     ----------
-    coordinates : (2, 2, m)
-        Work space, as `room`, `force`, `speed`, `active` and `elimination`; `accumulator` is not changed.
-    begin, end : float, s
-        Times after the shaft's angle 0 at which each revolution begins and ends.
-    moment : float, s
-        As in `mode_change.change_contacts`.
     takes_events : bool
         Whether events are computed here; else each is left to the caller, who changes motion and states.
-    most_events : int
-        Most events in a revolution.
-    reached : (4,)
-        Pieces filled in, states of the pairs, revolution, and pieces before that revolution; in place.
-    passed : (1,), s
-        Time reached in the revolution; in place.
-    motion : (2 n,)
-        In place.
     least : (r, 2, q)
         As in `flow.follow_piece`, for each of the r revolutions.
+    work : EventWork, accumulator : Accumulator
+        Work space; the accumulator is not changed.
     """
+    reached, passed, motion = passage.reached, passage.passed, passage.motion
     while reached[REVOLUTION] < least.shape[0]:
         k, states = reached[PIECE], reached[STATES]
-        if k - reached[BEGUN] > most_events:
+        if k - reached[BEGUN] > timing.most_events:
             return TOO_MANY
         if k == rows.times.shape[0]:
             return FULL
@@ -153,14 +148,9 @@ def follow_revolutions(
         duration, crossing = follow_piece(
             tables,
             room,
+            timing,
             motion,
             begun,
-            spin,
-            tick,
-            search_level,
-            longest_level,
-            end - begun,
-            coordinates,
             rows.motions[k],
             rows.rates[k],
             least[reached[REVOLUTION]],
@@ -178,24 +168,22 @@ def follow_revolutions(
             if reduced.spring > 0.0:
                 states_after = change_pressed(reduced, states, crossing, after)
             else:
-                angle = spin * passed[0]
+                angle = timing.spin * passed[0]
                 states_after = change_contacts(
                     reduced,
                     states,
                     crossing,
-                    spin,
-                    moment,
+                    timing.spin,
+                    timing.moment,
                     np.cos(angle),
                     np.sin(angle),
                     after,
                     bool(np.bool_(False)),  # no literal, for which it would be compiled again
-                    force,
-                    given[0],
-                    speed,
-                    active,
-                    elimination,
+                    work,
                     accumulator,
                 )
+                for i in range(given.shape[1]):
+                    given[0, i] = work.given[0, i]
             if states_after < 0:
                 return UNSOLVED
         rows.states[k, 0], rows.states[k, 1] = states, crossing
@@ -207,7 +195,7 @@ def follow_revolutions(
         if crossing == 0:
             reached[REVOLUTION] += 1
             reached[BEGUN] = k + 1
-            passed[0] = begin
+            passed[0] = timing.begin
         elif not takes_events:
             return AT_EVENT
     return FOLLOWED

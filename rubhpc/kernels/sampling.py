@@ -63,6 +63,14 @@ def with_coordinates(recorder: Recorder, m: int) -> Recorder:
     return recorder._replace(begun=np.zeros((2, m)), path=np.zeros((4, 2, m)))
 
 
+class Measured(Struct):
+    """What is measured of a case: work space, samples, and sums and extrema."""
+
+    recorder: Recorder
+    samples: Samples
+    accumulator: Accumulator
+
+
 @linked_sum
 def read_outputs(output: Floats, mode: int, z_re: Floats, z_im: Floats, n_value: int, value: Floats) -> None:
     """Fill the first `n_value` outputs from the modal coordinates; their number is a multiple of four.
@@ -97,14 +105,13 @@ def take_samples(
     first: int,
     count: int,
     interval: float,
-    recorder: Recorder,
-    samples: Samples,
-    accumulator: Accumulator,
+    measured: Measured,
 ) -> None:
     """Record `count` samples from `first` on in one mode; one past the record counts for extrema only.
 
     `interval` (s) is the time between samples, `z` the coordinates at the first one.
     """
+    recorder, samples, accumulator = measured.recorder, measured.samples, measured.accumulator
     read_samples(
         tables.output,
         mode,

@@ -10,8 +10,8 @@ from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.accumulators import Accumulator  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.contact_modes import Reduced  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.elimination import eliminate
-from rubhpc.kernels.flow import PieceRoom  # noqa: TC001 - part of a kernel's signature
-from rubhpc.kernels.mode_change import product
+from rubhpc.kernels.flow import PieceRoom, Timing  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.mode_change import EventWork, product
 from rubhpc.kernels.revolutions import (
     AFTER,
     AT_EVENT,
@@ -23,6 +23,7 @@ from rubhpc.kernels.revolutions import (
     REVOLUTION,
     STATES,
     UNSOLVED,
+    Passage,
     PieceModes,
     PieceRows,
     follow_revolutions,
@@ -54,6 +55,9 @@ RESIDUAL, SHARE = range(2)  # items of `Search.share`
 class Search(Struct):
     """A search under way; n reduced degrees."""
 
+    most_iterations: int
+    least_step: float  # share of a step that is tried last
+    most_residual: float  # of the beginning; from a larger one nothing is sought
     now: Ints  # (11,)
     share: Floats  # (2,), residual of the best trial, and share of the step that is tried
     motion: Floats  # (2 n,), beginning of the best trial
@@ -65,9 +69,12 @@ class Search(Struct):
     rows: Floats  # (2 n, 4 n), inverse of the identity less the derivative, behind a matrix
 
 
-def new_search(width: int) -> Search:
-    """Room for searches among motions of this width (2 n)."""
+def new_search(width: int, most_iterations: int, least_step: float, most_residual: float) -> Search:
+    """Room for a search among motions of this width (2 n), within limits."""
     return Search(
+        most_iterations=most_iterations,
+        least_step=least_step,
+        most_residual=most_residual,
         now=np.zeros(11, dtype=np.int64),
         share=np.zeros(2),
         motion=np.empty(width),
@@ -85,30 +92,15 @@ def search_period(
     modes: PieceModes,
     reduced: Reduced,
     room: PieceRoom,
-    coordinates: Floats,
-    spin: float,
-    tick: float,
-    search_level: int,
-    longest_level: int,
-    turn: float,
-    moment: float,
+    timing: Timing,
     has_states: bool,
-    most_events: int,
-    most_iterations: int,
-    least_step: float,
-    most_residual: float,
     search: Search,
     changes: ChangeRoom,
-    reached: Ints,
-    passed: Floats,
-    motion: Floats,
+    passage: Passage,
     first_rows: PieceRows,
     second_rows: PieceRows,
     least: Floats,
-    force: Floats,
-    speed: Floats,
-    active: NDArray[np.bool_],
-    elimination: Floats,
+    work: EventWork,
     accumulator: Accumulator,
 ) -> int:
     """Search for a motion that closes after as many revolutions as `least` has rows.
@@ -119,15 +111,11 @@ def search_period(
 
     Parameters
     ----------
-    turn : float, s
-        Duration of a revolution.
     has_states : bool
         Whether friction is set-valued: events are left to the caller, as by `follow_revolutions`.
-    least_step, most_residual : float
-        Share of a step that is tried last, and residual of the beginning from which nothing is sought.
     search : Search
-        In place: `begin_search` has filled it in.
-    reached, passed, motion, least
+        In place.
+    passage, least
         Of the trial under way, as `follow_revolutions` has them.
     first_rows, second_rows : PieceRows
         Of the best trial and of the one under way, by turns.
@@ -138,7 +126,8 @@ def search_period(
         An outcome. After `FOUND`, `search.columns` is the derivative over the shortest period after which the
         motion closes.
     """
-    now = search.now
+    now, spin = search.now, timing.spin
+    reached, motion = passage.reached, passage.motion
     while True:
         if now[NEXT] == FOLLOWING or now[NEXT] == LOST:
             outcome = UNSOLVED
@@ -147,25 +136,12 @@ def search_period(
                     modes,
                     reduced,
                     room,
-                    coordinates,
-                    spin,
-                    tick,
-                    search_level,
-                    longest_level,
-                    0.0,
-                    turn,
-                    moment,
+                    timing,
                     not has_states,
-                    most_events,
-                    reached,
-                    passed,
-                    motion,
+                    passage,
                     second_rows if now[BEST] == 0 else first_rows,
                     least,
-                    force,
-                    speed,
-                    active,
-                    elimination,
+                    work,
                     accumulator,
                 )
                 if outcome in (MODE_UNKNOWN, FULL, AT_EVENT):
@@ -174,7 +150,7 @@ def search_period(
             if is_first and outcome != FOLLOWED:
                 return outcome
             if outcome == FOLLOWED and take_trial(spin, search, int(reached[PIECE]), reached[STATES], motion):
-                if is_first and not search.share[RESIDUAL] <= most_residual:
+                if is_first and not search.share[RESIDUAL] <= search.most_residual:
                     return FAR
                 if now[ENDS] == now[BEGINS] and search.share[RESIDUAL] <= CONVERGED:
                     now[N_SHORTEST] = shortest_period(
@@ -185,23 +161,23 @@ def search_period(
                         search,
                     )
                     begin_carrying(ENDING, search)
-                elif now[ITERATION] >= most_iterations:
+                elif now[ITERATION] >= search.most_iterations:
                     return TOO_LONG
                 elif now[HAS_DERIVATIVE] != 0:
                     now[NEXT] = SOLVING
                 else:
                     begin_carrying(CARRYING, search)
             elif now[TRIED] == now[ENDS] and now[ENDS] != now[BEGINS]:
-                begin_trial(int(now[BEGINS]), search, reached, passed, motion, least)
+                begin_trial(int(now[BEGINS]), search, passage, least)
             else:
                 search.share[SHARE] *= 0.5
-                if search.share[SHARE] >= least_step:
-                    begin_trial(int(now[ENDS]), search, reached, passed, motion, least)
+                if search.share[SHARE] >= search.least_step:
+                    begin_trial(int(now[ENDS]), search, passage, least)
                 elif now[IS_FRESH] != 0:
                     return STALLED
                 else:
                     now[ITERATION] += 1
-                    if now[ITERATION] >= most_iterations:
+                    if now[ITERATION] >= search.most_iterations:
                         return TOO_LONG
                     begin_carrying(CARRYING, search)
         if now[NEXT] == CARRYING or now[NEXT] == ENDING:
@@ -231,7 +207,7 @@ def search_period(
             now[NEXT] = STEPPING
         if now[NEXT] == STEPPING:
             search.share[SHARE] = 1.0
-            begin_trial(int(now[ENDS]), search, reached, passed, motion, least)
+            begin_trial(int(now[ENDS]), search, passage, least)
 
 
 @linked_sum
@@ -291,16 +267,15 @@ def invert(search: Search) -> bool:
 
 
 @linked_sum
-def begin_trial(
-    states: int, search: Search, reached: Ints, passed: Floats, motion: Floats, least: Floats
-) -> None:
+def begin_trial(states: int, search: Search, passage: Passage, least: Floats) -> None:
     """Begin a share of a step from the best trial, with the pairs in these states."""
+    reached, motion = passage.reached, passage.motion
     search.now[NEXT], search.now[TRIED] = FOLLOWING, states
     for i in range(motion.size):
         search.tried[i] = search.motion[i] + search.share[SHARE] * search.step[i]
         motion[i] = search.tried[i]
     reached[PIECE], reached[STATES], reached[REVOLUTION], reached[BEGUN] = 0, states, 0, 0
-    passed[0] = 0.0
+    passage.passed[0] = 0.0
     least[:] = np.inf
 
 

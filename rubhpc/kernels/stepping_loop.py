@@ -19,12 +19,18 @@ from rubhpc.kernels.accumulators import (
     STEP,
     TWIST_ACCELERATION,
     UNBALANCE_WORK,
-    Accumulator,
-    Samples,
     observe_contact,
     observe_solution,
 )
-from rubhpc.kernels.case_progress import CONTACT_UNSOLVED, FINISHED, MOST_STEPS, PAUSED, Clock, Progress
+from rubhpc.kernels.case_progress import (
+    CONTACT_UNSOLVED,
+    FINISHED,
+    MOST_STEPS,
+    PAUSED,
+    Clock,
+    Coordinates,
+    Progress,
+)
 from rubhpc.kernels.complementarity import UNSOLVED
 from rubhpc.kernels.contact_forces import solve_contact
 from rubhpc.kernels.contact_modes import ModeTables, Reduced, dot, event_free_interval, propagate
@@ -32,7 +38,7 @@ from rubhpc.kernels.contact_pairs import N_DEGREE, Pairs, Workspace, fill_start,
 from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.laws import is_bouncing, is_penalty, is_plain
 from rubhpc.kernels.measuring import begin_span, end_span
-from rubhpc.kernels.sampling import Recorder, take_samples
+from rubhpc.kernels.sampling import Measured, take_samples
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -131,13 +137,10 @@ def advance_by_steps(
     last_tick: int,
     is_recorded: bool,
     progress: Progress,
-    z: Floats,
-    z_next: Floats,
+    coordinates: Coordinates,
     ends: Floats,
     placed: Floats,
-    recorder: Recorder,
-    samples: Samples,
-    accumulator: Accumulator,
+    measured: Measured,
 ) -> int:
     """Advance a case from the tick reached to `last_tick`, as `event_loop.advance` does.
 
@@ -145,7 +148,8 @@ def advance_by_steps(
     keeps the degrees at the beginning and the end of the step before if that was equally short, else NaN. Its
     other two rows and `placed` (2, n) are work space.
     """
-    q = pairs.radius.size
+    q, z, z_next = pairs.radius.size, coordinates.z, coordinates.z_next
+    samples, accumulator = measured.samples, measured.accumulator
     z_re, z_im, next_re, next_im = z[0], z[1], z_next[0], z_next[1]
     switch_re, switch_im = tables.switch_re, tables.switch_im
     gap_rate_re, gap_rate_im, bound = tables.rate_re, tables.rate_im, tables.bound
@@ -184,13 +188,11 @@ def advance_by_steps(
         if is_sample and (not is_end or t == end_tick):
             i_sample = t >> clock.sample_level
             n_taken = i_sample + 1 - progress.next_sample  # 1; a literal would be another type
-            take_samples(
-                tables, progress.mode, z_re, z_im, i_sample, n_taken, interval, recorder, samples, accumulator
-            )
+            take_samples(tables, progress.mode, z_re, z_im, i_sample, n_taken, interval, measured)
             progress.next_sample = i_sample + 1
         if is_end:
             if is_recorded and t == end_tick:
-                end_span(tables, clock, z, progress, recorder, accumulator)
+                end_span(tables, clock, z, progress, measured)
             return FINISHED
         limit = last_tick
         if is_recorded:
@@ -274,7 +276,7 @@ def advance_by_steps(
             take_back(impulses, work, step, next_re, next_im, before, now)
         if is_recorded and is_touching:
             if progress.energy_from >= 0:
-                end_span(tables, clock, z, progress, recorder, accumulator)
+                end_span(tables, clock, z, progress, measured)
             for k in range(x.size):
                 if not is_placed:
                     x[k] = dot(motion_re[0, k], motion_im[0, k], z_re, z_im)
@@ -286,7 +288,7 @@ def advance_by_steps(
             for k in range(x.size):
                 x[k] = x_after[k]
         elif is_recorded and progress.energy_from < 0:
-            begin_span(z, progress, recorder)
+            begin_span(z, progress, measured.recorder)
         is_placed = is_touching
         if not (is_near and is_followed):
             before[0] = np.nan

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_sum, linked_sum
+from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.contact_modes import Reduced, add_rows, find_mode
 from rubhpc.kernels.linear_theory import BEGINS, ENDS, FIRST, LAST
 from rubhpc.kernels.revolutions import AFTER, PieceModes, PieceRows
@@ -17,6 +18,38 @@ Ints = NDArray[np.int64]
 PIECE, N_TIME, N_PART = range(3)  # items of `reached`
 
 
+class Watching(Struct):
+    """What is filled in along the pieces of a period, all in place, and its work space; k pieces."""
+
+    n_time: Ints  # (k,), times at which its gaps and forces are taken, in the middle of as many equal parts
+    reached: Ints  # (3,), pieces, times and parts filled in
+    columns: Floats  # (2 n, 2 n), derivative of the motion with which the piece begins by that at the section
+    begun: Floats  # (2 n,), motion with which the piece begins
+    parts: Ints  # (s k, 4)
+    value: Floats  # (t,)
+    change: Floats  # (t, 2 n), by the motion at the section
+    none_kept: Floats  # (0, 2 n, 2 n)
+    coordinates: Floats  # (2, m)
+    passing: Floats  # (4, m)
+
+
+def begin_watching(motion: Floats, n_time: Ints, n_switch: int, m: int) -> Watching:
+    """Begin with the motion (2 n,) at the section."""
+    most, width = n_switch * int(n_time.sum()), motion.size
+    return Watching(
+        n_time=n_time,
+        reached=np.zeros(3, dtype=np.int64),
+        columns=np.eye(width),
+        begun=motion.copy(),
+        parts=np.empty((n_switch * n_time.size, 4), dtype=np.int64),
+        value=np.empty(most),
+        change=np.empty((most, width)),
+        none_kept=np.empty((0, width, width)),
+        coordinates=np.empty((2, m)),
+        passing=np.empty((4, m)),
+    )
+
+
 @jit_sum
 def watch_pieces(
     modes: PieceModes,
@@ -24,40 +57,18 @@ def watch_pieces(
     has_states: bool,
     spin: float,
     rows: PieceRows,
-    n_time: Ints,
-    reached: Ints,
+    watching: Watching,
     room: ChangeRoom,
-    columns: Floats,
-    none_kept: Floats,
-    begun: Floats,
-    coordinates: Floats,
-    passing: Floats,
-    parts: Ints,
-    value: Floats,
-    change: Floats,
 ) -> int:
     """Fill in what is watched along the pieces of a period (`linear_theory.Watched`).
-
-    Parameters
-    ----------
-    n_time : (k,)
-        Times in each piece at which its gaps and forces are taken, in the middle of as many equal parts.
-    reached : (3,)
-        Pieces, times and parts filled in; in place.
-    columns : (2 n, 2 n)
-        Derivative of the motion with which the piece begins by that at the section; in place.
-    begun : (2 n,)
-        Motion with which the piece begins; in place.
-    coordinates, passing : (2, m), (4, m)
-        Work space; `none_kept` (0, 2 n, 2 n) is none.
-    parts, value, change : (s, 4), (t,), (t, 2 n)
-        Filled in, the last by the motion at the section.
 
     Returns
     -------
     int
         The piece whose contact mode is not known, or `ALL_CARRIED`.
     """
+    n_time, reached, begun = watching.n_time, watching.reached, watching.begun
+    columns, parts, coordinates = watching.columns, watching.parts, watching.coordinates
     n_piece, m = n_time.size, coordinates.shape[1]
     while reached[PIECE] < n_piece:
         k = reached[PIECE]
@@ -88,13 +99,13 @@ def watch_pieces(
                 modes.switch_im[place, j],
                 step,
                 coordinates,
-                passing,
+                watching.passing,
                 room,
-                value[first : first + n_time[k]],
-                change[first : first + n_time[k]],
+                watching.value[first : first + n_time[k]],
+                watching.change[first : first + n_time[k]],
             )
             reached[N_TIME], reached[N_PART] = first + n_time[k], part + 1
-        carry_pieces(modes, reduced, has_states, rows, int(k), int(k + 1), room, columns, none_kept)
+        carry_pieces(modes, reduced, has_states, rows, int(k), int(k + 1), room, columns, watching.none_kept)
         for i in range(begun.size):
             begun[i] = rows.motions[k, AFTER, i]
         reached[PIECE] = k + 1

@@ -1,5 +1,7 @@
 """How long no switch function can vanish unseen, against many instants; in Python: nothing is compiled."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from rubhpc.kernels.friction_states import FORWARD
 TICK = 1e-6  # s
 BOUNDS = ("positive_until", "is_positive", "falling_until", "ticks_beyond", "floor_log2")
 BOUNDS += ("is_watched", "state_of")
+DERIVATIVES = ("switch_re", "switch_im", "rate_re", "rate_im", "bend_re", "bend_im")
 
 
 @pytest.fixture(autouse=True)
@@ -39,7 +42,8 @@ def test_no_function_changes_unseen_within_the_interval_that_is_promised(n_fast)
         z_re, z_im = np.ones(m), np.zeros(m)
         known = np.zeros((2, 2), dtype=np.int64)
         now, shortest, longest = 7, 1, 10_000
-        given = (FORWARD, 0, *derivatives, turn[None], z_re, z_im, now, TICK, shortest, longest)
+        tables = SimpleNamespace(**dict(zip(DERIVATIVES, derivatives, strict=True)), turn=turn[None])
+        given = (FORWARD, tables, 0, z_re, z_im, now, TICK, shortest, longest)
         free, sure = plain(event_bounds.free_until)(*given, known)
         assert now <= free <= sure <= known[1].min() <= now + longest
         assert free <= known[0].min()

@@ -8,7 +8,7 @@ import pytest
 from rubhpc.integrate.measuring.samples import new_accumulator
 from rubhpc.kernels.accumulators import DRIVE_WORK, FRICTION_LOSS, IMPACT, IMPACT_LOSS, PRESSING
 from rubhpc.kernels.contact_modes import Reduced
-from rubhpc.kernels.mode_change import change_contacts
+from rubhpc.kernels.mode_change import change_contacts, event_work
 
 N, SPIN, MOMENT = 7, 150.0, 1e-7
 ANGLE = 0.8
@@ -55,11 +55,7 @@ def change(reduced, closed, crossing, motion, *, is_recorded=False):
         np.sin(ANGLE),
         after,
         is_recorded,
-        np.zeros(q),
-        np.zeros(q),
-        np.zeros(q),
-        np.zeros(q, dtype=np.bool_),
-        np.zeros((q, q + 1)),
+        event_work(q),
         accumulator,
     )
     return found, after, accumulator

@@ -49,6 +49,17 @@ def test_arrays_of_any_layout():
         assert total(Inner(part, 0, 0.0)) == part.sum() + part[0, 1]
 
 
+def test_an_interruption_while_python_is_asked_for_one_is_raised(monkeypatch):
+    def interrupted(_held):
+        raise KeyboardInterrupt
+
+    held = Inner(np.zeros((2, 3)), 0, 0.0)
+    assert total(held) == 0.0
+    monkeypatch.setattr(Inner, "_address", property(interrupted))
+    with pytest.raises(KeyboardInterrupt):
+        total(held)
+
+
 @numba.njit
 def make(table, count):
     held = Outer(row=table[1], inner=Inner(table, count, is_open=False, size=0.25))

@@ -12,7 +12,7 @@ from rubhpc.fem.assemble import assemble
 from rubhpc.integrate.marches.workspace import workspace
 from rubhpc.integrate.measuring.samples import empty_samples, new_accumulator
 from rubhpc.integrate.packing import pack, pairs_of
-from rubhpc.kernels.central_difference import advance
+from rubhpc.kernels.central_difference import Stepper, advance
 from rubhpc.kernels.laws import MULTIPLIER
 
 if TYPE_CHECKING:
@@ -79,19 +79,17 @@ class KernelCase:
 
     def advance(self, first, last, *, is_recorded=False, limit=1.0):
         """Outcome of the kernel over samples `first` to `last`."""
+        packed = self.packed
+        stepper = Stepper(
+            packed.linear, self.spin, self.step, self.per_revolution, limit, packed.output_row, packed.probe
+        )
         return advance(
-            self.packed.linear,
+            stepper,
             self.pairs,
-            self.spin,
-            self.step,
             1,
-            self.per_revolution,
             first,
             last,
             is_recorded,
-            limit,
-            self.packed.output_row,
-            self.packed.probe,
             self.state,
             self.work,
             np.zeros((3, self.state.shape[1])),

@@ -119,20 +119,13 @@ class CentralDifferenceMarch(March):
         *,
         is_recorded: bool,
     ) -> int:
-        setup = self._setup
         return kernel.advance(
-            setup.packed.linear,
+            self._setup.stepper,
             self._pairs,
-            setup.spin,
-            setup.step,
             steps_per_sample,
-            setup.samples_per_revolution,
             self.sample,
             stop,
             is_recorded,
-            setup.displacement_limit,
-            setup.packed.output_row,
-            setup.packed.probe,
             state,
             self._work,
             self._scratch,

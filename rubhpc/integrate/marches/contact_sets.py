@@ -10,7 +10,7 @@ import numpy as np
 from rubhpc.integrate.marches.modal import ModalMarch
 from rubhpc.integrate.measuring.samples import no_record
 from rubhpc.kernels.contact_modes import FORCED_LEVEL
-from rubhpc.kernels.mode_change import change_contacts
+from rubhpc.kernels.mode_change import EventWork, change_contacts, event_work
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -62,10 +62,10 @@ class ContactSets(ModalMarch):
         stride = self.tables.switch_re.shape[1] // self._clearance.size
         return sum(1 << stride * int(i) for i in np.flatnonzero(self.opened(mask)))
 
-    @cached_property
+    @property
     def given(self) -> Floats:
         """Normal and tangential impulses (2, q), N s, of the last event by `change`."""
-        return np.zeros((2, self._clearance.size))
+        return self.change_work[0].given
 
     def forces(self, mode: int, z: Floats) -> Floats:
         """Forces (q,), N, at coordinates (2, m) of a contact mode, given by its index in the tables."""
@@ -97,7 +97,6 @@ class ContactSets(ModalMarch):
         `crossing` are the switch functions that vanish, `angle` (rad) is that of the shaft; `moment` (s) is
         by default `self.moment`.
         """
-        force, *room = self.change_work
         return int(
             self.take_change(
                 self.bodies,
@@ -109,18 +108,14 @@ class ContactSets(ModalMarch):
                 np.sin(angle),
                 motion,
                 False,
-                force,
-                self.given[0],
-                *room,
+                *self.change_work,
             )
         )
 
     @cached_property
-    def change_work(self) -> tuple[Floats, Floats, NDArray[np.bool_], Floats, Accumulator]:
+    def change_work(self) -> tuple[EventWork, Accumulator]:
         """Work space of `change` (`change_contacts`)."""
-        q = self._clearance.size
-        room = np.zeros(q), np.zeros(q), np.zeros(q, dtype=np.bool_), np.zeros((q, q + 1))
-        return *room, self._unrecorded
+        return event_work(self._clearance.size), self._unrecorded
 
     @property
     def _unrecorded(self) -> Accumulator:

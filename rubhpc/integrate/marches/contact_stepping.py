@@ -13,7 +13,7 @@ from rubhpc.integrate.packing import pairs_of
 from rubhpc.kernels.case_progress import FINISHED, NONE, shaft_turn
 from rubhpc.kernels.contact_pairs import N_DEGREE
 from rubhpc.kernels.measuring import end_span
-from rubhpc.kernels.sampling import with_coordinates
+from rubhpc.kernels.sampling import Measured, with_coordinates
 from rubhpc.kernels.stepping_loop import ContactImpulses, advance_by_steps
 
 if TYPE_CHECKING:
@@ -109,7 +109,8 @@ class ContactSteppingMarch(ModalMarch):
         outcome = self._kernel(last_tick, samples, accumulator, is_recorded)
         if outcome == FINISHED:
             if is_recorded:
-                end_span(self.tables, clock, self._z, self._bare_progress, self._recorder, accumulator)
+                measured = Measured(self._recorder, samples, accumulator)
+                end_span(self.tables, clock, self._z, self._bare_progress, measured)
             self.progress.energy_from = NONE
         return outcome
 
@@ -157,11 +158,8 @@ class ContactSteppingMarch(ModalMarch):
             last_tick,
             is_recorded,
             self._bare_progress,
-            self._z,
-            self._z_next,
+            self._coordinates,
             self._ends,
             self._placed,
-            self._recorder,
-            samples,
-            accumulator,
+            Measured(self._recorder, samples, accumulator),
         )

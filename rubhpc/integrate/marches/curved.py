@@ -14,6 +14,7 @@ from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary, curved_
 from rubhpc.kernels.case_progress import ask_for, begin_in
 from rubhpc.kernels.curved_contact import KEPT, curved_work
 from rubhpc.kernels.curved_loop import advance_curved
+from rubhpc.kernels.sampling import Measured
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -135,14 +136,10 @@ class CurvedMarch(EventDrivenMarch):
             last_tick,
             is_recorded,
             self._bare_progress,
-            self._z,
-            self._z_next,
-            self._motion,
+            self._coordinates,
             self._work,
             self._event_work,
-            self._recorder,
-            samples,
-            accumulator,
+            Measured(self._recorder, samples, accumulator),
         )
 
     def _unsolved(self) -> str:

@@ -12,11 +12,12 @@ from rubhpc.integrate.marches.contact_sets import ContactSets
 from rubhpc.integrate.marches.march import ALL_SAMPLES
 from rubhpc.integrate.marches.met_modes import MetModes, NoClosedForm
 from rubhpc.kernels.case_progress import FINISHED, MODE_WANTED, NO_SECTIONS, PAUSED, Sections, restart_clock
-from rubhpc.kernels.contact_event import event_work
 from rubhpc.kernels.contact_modes import DYING
 from rubhpc.kernels.event_loop import advance
+from rubhpc.kernels.mode_change import event_work
 from rubhpc.kernels.piece_loop import advance_pieces
 from rubhpc.kernels.pieces import FAST, QUICK
+from rubhpc.kernels.sampling import Measured
 from rubhpc.kernels.trail import Trail, begin_trail, new_trail, no_trail
 
 if TYPE_CHECKING:
@@ -178,13 +179,9 @@ class EventDrivenMarch(ContactSets):
             self.clock,
             pieces,
             self._bare_progress,
-            self._z,
-            self._z_next,
-            self._motion,
+            self._coordinates,
             self._event_work,
-            self._recorder,
-            samples,
-            sums,
+            Measured(self._recorder, samples, sums),
             NO_SECTIONS,
         )
 
@@ -292,13 +289,9 @@ class EventDrivenMarch(ContactSets):
             self.clock,
             *to,
             self._bare_progress,
-            self._z,
-            self._z_next,
-            self._motion,
+            self._coordinates,
             self._event_work,
-            self._recorder,
-            samples,
-            accumulator,
+            Measured(self._recorder, samples, accumulator),
             sections,
         )
 

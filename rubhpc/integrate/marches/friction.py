@@ -24,6 +24,7 @@ from rubhpc.kernels.case_progress import (
 )
 from rubhpc.kernels.friction_kernel import advance_friction
 from rubhpc.kernels.pieces import NO_PIECES
+from rubhpc.kernels.sampling import Measured
 from rubhpc.kernels.trail import BROKEN
 
 if TYPE_CHECKING:
@@ -136,13 +137,9 @@ class FrictionMarch(StateSets):
             pieces,
             sums,
             self._bare_progress,
-            self._z,
-            self._z_next,
-            self._motion,
+            self._coordinates,
             self._work,
-            self._recorder,
-            samples,
-            accumulator,
+            Measured(self._recorder, samples, accumulator),
             sections,
         )
 

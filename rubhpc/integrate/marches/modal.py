@@ -19,6 +19,7 @@ from rubhpc.kernels.case_progress import (
     CONTACT_UNSOLVED,
     DIVERGED,
     FINISHED,
+    Coordinates,
     bare,
     begin_in,
     new_progress,
@@ -166,7 +167,8 @@ class ModalMarch(March):
         self.tables = tables
         m = tables.switch_re.shape[2]
         if self._z.shape[1] != m:
-            self._z, self._z_next = aligned((2, m)), aligned((2, m))
+            self._z = aligned((2, m))
+            self._coordinates = Coordinates(self._z, aligned((2, m)), self._motion)
             self._recorder = with_coordinates(self._recorder, m)
 
     def _start(self, mode: int) -> None:

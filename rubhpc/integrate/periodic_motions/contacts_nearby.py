@@ -9,7 +9,7 @@ import numpy as np
 from rubhpc.integrate.periodic_motions.revolution import joined
 from rubhpc.kernels.linear_theory import Watched, keeps_contacts
 from rubhpc.kernels.small_changes import ALL_CARRIED
-from rubhpc.kernels.watching import N_PART, N_TIME, watch_pieces
+from rubhpc.kernels.watching import N_PART, N_TIME, begin_watching, watch_pieces
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -59,10 +59,7 @@ def _watch(
 ) -> tuple[NDArray[np.int64], Floats, Floats]:
     """Parts, values and changes of what is watched along the pieces of a period."""
     n_time = np.maximum(3, np.rint(PER_REVOLUTION * rows.times[:, 1] / piecewise.turn).astype(np.int64))
-    most, width, m = piecewise.n_switch * int(n_time.sum()), motion.size, piecewise.coordinates.shape[2]
-    parts, value = np.empty((piecewise.n_switch * n_time.size, 4), dtype=np.int64), np.empty(most)
-    change, columns, begun = np.empty((most, width)), np.eye(width), motion.copy()
-    reached = np.zeros(3, dtype=np.int64)
+    watching = begin_watching(motion, n_time, piecewise.n_switch, piecewise.room.ahead.shape[1])
     piece = 0
     while piece != ALL_CARRIED:
         piecewise.mode(int(rows.states[piece, 0]))
@@ -72,17 +69,8 @@ def _watch(
             piecewise.has_states,
             piecewise.setup.spin,
             rows,
-            n_time,
-            reached,
-            piecewise.change_room(width),
-            columns,
-            np.empty((0, width, width)),
-            begun,
-            np.empty((2, m)),
-            np.empty((4, m)),
-            parts,
-            value,
-            change,
+            watching,
+            piecewise.change_room(motion.size),
         )
-    n = int(reached[N_TIME])
-    return parts[: reached[N_PART]].copy(), value[:n].copy(), change[:n]
+    n = int(watching.reached[N_TIME])
+    return watching.parts[: watching.reached[N_PART]].copy(), watching.value[:n].copy(), watching.change[:n]

@@ -19,7 +19,7 @@ from rubhpc.integrate.periodic_motions.revolution import (
     longer,
     whole_revolutions,
 )
-from rubhpc.kernels.flow import piece_room
+from rubhpc.kernels.flow import Timing, piece_room
 from rubhpc.kernels.friction_states import STUCK, state_of
 from rubhpc.kernels.revolutions import (
     AFTER,
@@ -31,8 +31,11 @@ from rubhpc.kernels.revolutions import (
     PIECE,
     STATES,
     UNSOLVED,
+    Passage,
     PieceRows,
+    begin_passage,
     follow_revolutions,
+    new_passage,
     piece_rows,
 )
 from rubhpc.kernels.small_changes import ChangeRoom, change_room
@@ -43,7 +46,6 @@ if TYPE_CHECKING:
     from rubhpc.integrate.record import State
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Change = Literal["touch", "release", "slip", "stick"]
 
 MOST_EVENTS = 1000  # in a revolution
@@ -106,6 +108,8 @@ class PiecewiseMotion:
         self._change_rooms: dict[tuple[int, int], ChangeRoom] = {}
         self._take_tables()
         self._rows = piece_rows(FEW_PIECES, 2 * self.n, self.n_switch, self.q)
+        self._passage = new_passage(2 * self.n)
+        self._asked: tuple[int, int, float, float] | None = None
         clock = self.march.clock
         self.highest = self._tables.power_re.shape[1] - 1
         self.longest = min(self.highest, int(math.log2(self.turn / STEPS_PER_REVOLUTION / clock.tick)))
@@ -182,41 +186,48 @@ class PiecewiseMotion:
         share: float = 1.0,
     ) -> list[Revolution]:
         """Follow a motion through several revolutions, each as `revolve` does."""
-        reached, motion = np.array([0, states, 0, 0]), motion.copy()
-        begin, end, clock = phase * self.turn, (phase + share) * self.turn, self.march.clock
-        passed, least = np.array([begin]), np.full((n_revolution, 2, self.q), np.inf)
+        timing = self.timing(self.longest, most_events, phase, share)
+        passage, least = self._passage, np.full((n_revolution, 2, self.q), np.inf)
+        begin_passage(passage, motion, states, timing.begin)
         outcome = MODE_UNKNOWN
         while outcome != FOLLOWED:
             if outcome == MODE_UNKNOWN:
-                self.mode(int(reached[STATES]))
+                self.mode(int(passage.reached[STATES]))
             elif outcome == FULL:
                 self._rows = longer(self._rows)
             elif outcome == AT_EVENT:
-                self.take_event(self._rows, reached, passed, motion)
+                self.take_event(self._rows, passage)
             else:
                 raise Unfollowed(self.why_unfollowed(outcome, most_events))
             outcome = follow_revolutions(
                 self.known,
                 self.bodies,
                 self.room,
-                self.coordinates,
-                self.setup.spin,
-                clock.tick,
-                clock.search_level,
-                self.longest,
-                begin,
-                end,
-                self.march.moment,
+                timing,
                 not self.has_states,
-                most_events,
-                reached,
-                passed,
-                motion,
+                passage,
                 self._rows,
                 least,
                 *self.march.change_work,
             )
-        return whole_revolutions(copied(self._rows, int(reached[PIECE])), least)
+        return whole_revolutions(copied(self._rows, int(passage.reached[PIECE])), least)
+
+    def timing(self, longest: int, most_events: int, phase: float = 0.0, share: float = 1.0) -> Timing:
+        """Times of a share of a revolution from a phase on, in steps up to a level; the last one is kept."""
+        asked, clock = (longest, most_events, phase, share), self.march.clock
+        if self._asked != asked:
+            self._asked = asked
+            self._timing = Timing(
+                spin=self.setup.spin,
+                tick=clock.tick,
+                search_level=clock.search_level,
+                longest_level=longest,
+                begin=phase * self.turn,
+                end=(phase + share) * self.turn,
+                moment=self.march.moment,
+                most_events=most_events,
+            )
+        return self._timing
 
     def why_unfollowed(self, outcome: int, most_events: int) -> str:
         """Why a motion is not followed further, by the outcome of a kernel."""
@@ -226,9 +237,10 @@ class PiecewiseMotion:
             return "no contact forces that obey the laws were found"
         return f"more than {most_events} events in a revolution"
 
-    def take_event(self, rows: PieceRows, reached: Ints, passed: Floats, motion: Floats) -> None:
+    def take_event(self, rows: PieceRows, passage: Passage) -> None:
         """Take the event that ends the last piece, which `follow_revolutions` has left."""
-        k, angle = int(reached[PIECE]) - 1, self.setup.spin * passed[0]
+        reached, motion = passage.reached, passage.motion
+        k, angle = int(reached[PIECE]) - 1, self.setup.spin * passage.passed[0]
         states, crossing = rows.states[k, :2].tolist()
         after = self.march.change(states, crossing, angle, motion)
         if after < 0:
@@ -266,7 +278,7 @@ class PiecewiseMotion:
         self._modes.clear()
         self._tables = self.march.tables
         width = self._tables.switch_re.shape[2]
-        self.room, self.coordinates = piece_room(self.n_switch, width), np.empty((2, 2, width))
+        self.room = piece_room(self.n_switch, width)
         self.known = unknown_modes(self._tables)
         if len(self.march.derived) <= FEW_MODES:  # kernels would ask for them one by one
             for states in sorted(self.march.derived.keys() & set(self._tables.mask.tolist())):

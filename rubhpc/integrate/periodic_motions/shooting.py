@@ -21,6 +21,8 @@ from rubhpc.kernels.revolutions import (
     FULL,
     MODE_UNKNOWN,
     STATES,
+    begin_passage,
+    new_passage,
     piece_rows,
 )
 from rubhpc.kernels.shooting import (
@@ -49,6 +51,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.integrate.periodic_motions.revolution import Revolution
+    from rubhpc.kernels.flow import Timing
+    from rubhpc.kernels.shooting import Search
 
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
@@ -143,9 +147,11 @@ def shoot(
     NotConverged
         No motion was found that closes to 1e-10 of its size.
     """
-    shot = _Shot(piecewise, motion, states, period, watches_turns=watches_turns)
+    longest = piecewise.longest if watches_turns else piecewise.highest
+    search = new_search(motion.size, most_iterations, least_step, most_residual)
+    shot = _Shot(piecewise, motion, states, period, piecewise.timing(longest, most_events), search)
     try:
-        outcome = shot.run(most_events, most_iterations, least_step, most_residual)
+        outcome = shot.run()
     except Unfollowed as problem:
         raise NotConverged(str(problem)) from None
     residual, now = float(shot.search.share[RESIDUAL]), shot.search.now
@@ -166,20 +172,24 @@ class _Shot:
     """A search under way: what its kernel works with."""
 
     def __init__(
-        self, piecewise: PiecewiseMotion, motion: Floats, states: int, period: int, *, watches_turns: bool
+        self,
+        piecewise: PiecewiseMotion,
+        motion: Floats,
+        states: int,
+        period: int,
+        timing: Timing,
+        search: Search,
     ) -> None:
-        self._piecewise, width = piecewise, 2 * piecewise.n
-        self._longest = piecewise.longest if watches_turns else piecewise.highest
-        self.search = new_search(width)
-        self._reached = np.array([0, states, 0, 0])
-        self._passed, self._motion = np.zeros(1), motion.copy()
+        self._piecewise, self._timing, self.search = piecewise, timing, search
+        self._passage = new_passage(motion.size)
+        begin_passage(self._passage, motion, states, timing.begin)
         self._least = np.full((period, 2, piecewise.q), np.inf)
         k = FEW_PIECES * period
-        self._rows = [piece_rows(k, width, piecewise.n_switch, piecewise.q) for _ in range(2)]
-        self.search.tried[:] = motion
-        self.search.now[TRIED] = states
+        self._rows = [piece_rows(k, motion.size, piecewise.n_switch, piecewise.q) for _ in range(2)]
+        search.tried[:] = motion
+        search.now[TRIED] = states
 
-    def run(self, most_events: int, most_iterations: int, least_step: float, most_residual: float) -> int:
+    def run(self) -> int:
         """Search to an outcome, and do on the way what the kernel leaves to its caller.
 
         Raises
@@ -189,7 +199,7 @@ class _Shot:
         """
         now = self.search.now
         while True:
-            outcome = self._call(most_events, most_iterations, least_step, most_residual)
+            outcome = self._call()
             under_way = 1 - int(now[BEST])
             try:
                 if outcome == MODE_UNKNOWN:
@@ -197,11 +207,9 @@ class _Shot:
                 elif outcome == FULL:
                     self._rows[under_way] = longer(self._rows[under_way])
                 elif outcome == AT_EVENT:
-                    self._piecewise.take_event(
-                        self._rows[under_way], self._reached, self._passed, self._motion
-                    )
+                    self._piecewise.take_event(self._rows[under_way], self._passage)
                 elif outcome == SINGULAR:  # at a fold
-                    matrix = np.eye(self._motion.size) - self.search.columns
+                    matrix = np.eye(len(self.search.step)) - self.search.columns
                     self.search.step[:] = np.linalg.lstsq(matrix, self.search.defect, rcond=1e-12)[0]
                     now[NEXT] = STEPPING
                 else:
@@ -231,32 +239,20 @@ class _Shot:
         """States of the pairs whose contact mode the kernel asks for."""
         now = self.search.now
         if now[NEXT] == FOLLOWING:
-            return int(self._reached[STATES])
+            return int(self._passage.reached[STATES])
         return int(self._rows[int(now[BEST])].states[now[CARRIED], 0])
 
-    def _call(self, most_events: int, most_iterations: int, least_step: float, most_residual: float) -> int:
-        piecewise, clock = self._piecewise, self._piecewise.march.clock
+    def _call(self) -> int:
+        piecewise = self._piecewise
         return search_period(
             piecewise.known,
             piecewise.bodies,
             piecewise.room,
-            piecewise.coordinates,
-            piecewise.setup.spin,
-            clock.tick,
-            clock.search_level,
-            self._longest,
-            piecewise.turn,
-            piecewise.march.moment,
+            self._timing,
             piecewise.has_states,
-            most_events,
-            most_iterations,
-            least_step,
-            most_residual,
             self.search,
-            piecewise.change_room(self._motion.size),
-            self._reached,
-            self._passed,
-            self._motion,
+            piecewise.change_room(self.search.step.size),
+            self._passage,
             self._rows[0],
             self._rows[1],
             self._least,
