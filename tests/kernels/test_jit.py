@@ -57,7 +57,7 @@ def probe(tmp_path):
                 PYTHONPATH=str(tmp_path),
                 NUMBA_CACHE_DIR=str(tmp_path / "cache"),
                 PYTHONDONTWRITEBYTECODE="1",  # Python distinguishes sources by their second and size
-                **variables,
+                **{"RUBHPC_PLAIN_NUMBA": "", **variables},
             ),
             stdout=subprocess.PIPE,
             text=True,
