@@ -10,10 +10,9 @@ import numpy as np
 
 from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.running.case_rows import packed_measures
-from rubhpc.running.kept_setups import KeptSetups
+from rubhpc.running.kept_setups import KeptSetups, touched
 from rubhpc.running.memory import memory
-from rubhpc.running.preparations import touched
-from rubhpc.running.timed_cases import MOST_BYTES
+from rubhpc.running.sampled_cases import MOST_BYTES, roberts_pace
 from rubhpc.running.worker import integrate
 from rubhpc.schema import FAILED
 from rubhpc.storage.journal import Entry
@@ -170,10 +169,7 @@ class Lines:
             )
             at = tuple(int(i) for i in np.unravel_index(int(np.argsort(order)[k]), sizes or (1,)))
         else:
-            root = 2.0
-            for _ in range(64):  # root of x^(d + 1) = x + 1
-                root = (1.0 + root) ** (1.0 / (len(across) + 1))
-            at = tuple(int((0.5 + k * root ** -(i + 1)) % 1.0 * n) for i, n in enumerate(sizes))
+            at = tuple(((0.5 + k * roberts_pace(len(sizes))) % 1.0 * sizes).astype(int).tolist())
         window = [slice(None)] * len(self._places)
         for d, i in zip(across, at, strict=False):
             place = int(self._places[d][i])

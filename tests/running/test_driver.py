@@ -19,8 +19,8 @@ from rubhpc.errors import InputError, RubError, StoppedEarly, StoreError
 from rubhpc.integrate.compilation import compilation
 from rubhpc.running import case_setup, computing, job, stopping, worker
 from rubhpc.running.driver import run
+from rubhpc.running.kept_setups import count_preparations
 from rubhpc.running.pool import Alone
-from rubhpc.running.preparations import count_preparations
 from rubhpc.schema import (
     DIVERGED,
     DONE,
@@ -443,7 +443,7 @@ def test_as_many_speeds_are_prepared_as_are_predicted(physics, tmp_path, write):
 def test_preparations_of_many_cases_are_predicted_from_a_part(tmp_path, monkeypatch):
     grid = CaseGrid(read_study(write_sample(tmp_path, n=64)))
     whole = count_preparations(grid, np.ones(grid.shape, bool))
-    monkeypatch.setattr("rubhpc.running.preparations._MOST_COUNTED", 200)
+    monkeypatch.setattr("rubhpc.running.kept_setups._MOST_COUNTED", 200)
     part = count_preparations(grid, np.ones(grid.shape, bool))
     assert part.speed == pytest.approx(whole.speed, rel=0.25)
     assert part.friction == pytest.approx(whole.friction, rel=0.25)
