@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.errors import InputError
-from rubhpc.fem.constraints import rigid_body_row
 from rubhpc.fem.model import state_size
+from rubhpc.fem.statics import rigid_body_row
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.packing import degrees_of
 from rubhpc.integrate.record import State

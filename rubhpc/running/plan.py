@@ -9,11 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.running.kept_setups import MOST_BYTES, MOST_SETUPS, count_preparations, touched
-from rubhpc.running.memory import peak_memory
+from rubhpc.running.case_setup import MOST_BYTES, MOST_SETUPS, count_preparations, touched
 from rubhpc.running.plan_estimate import Cost, Estimate, percent
-from rubhpc.running.refined_lines import expected_cases
-from rubhpc.running.sampled_cases import CaseTimer, time_block
+from rubhpc.running.sampled_cases import CaseTimer, peak_memory, time_block
 from rubhpc.schema import DIVERGED, DONE, FAILED, INFERRED, MISSING, STATUS
 from rubhpc.storage.duration import duration, span
 from rubhpc.storage.growth import origins
@@ -32,7 +30,7 @@ from rubhpc.threads import on_one_thread
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rubhpc.running.kept_setups import Preparations
+    from rubhpc.running.case_setup import Preparations
     from rubhpc.running.sampled_cases import Sample
     from rubhpc.storage.manifest import Manifest
     from rubhpc.study.cases import CaseGrid
@@ -41,7 +39,7 @@ if TYPE_CHECKING:
 _LINE = 400  # bytes of a case in a journal, about, for one stator
 _OWN_COORDINATES = 9  # of the dimensions after the axes, the stators and the settings
 _SECONDS, _LEAST = 13.0, 4.0  # wall time of all, and of timing at least
-_FOR_CASES = 0.5  # of it in a refined map; the rest is for lines
+_OFF = 2.0  # factor by which the number of cases of a refined map is off, at most, as a rule (0.5 to 1.9)
 _FOR_HALF, _MANY, _LONG = 3.0, 4, 600.0  # s of it to time half of so many stators, if all takes so many s
 _AT_EDGES = 1.1  # seconds per step of cases that a refined map computes, over that of all cases, about
 _AGREED = 1.06  # most over least time, up to which no range is given
@@ -275,17 +273,16 @@ def make_plan(study: Study, part: str | None = None, say: Callable[[str], None] 
 
     began_timing = time.process_time()
     end = max(began + _SECONDS, time.monotonic() + _LEAST)
-    for_cases = end if refinement is None else time.monotonic() + _FOR_CASES * (end - time.monotonic())
     n_stator = len(study.rig.stator)
-    timer = CaseTimer(grid, for_cases - (_FOR_HALF if n_stator >= _MANY else 0.0))
+    timer = CaseTimer(grid, end - (_FOR_HALF if n_stator >= _MANY else 0.0))
     sample = timer.time_cases(missing, steps_at, say) if left else timer.sample
-    share, n_expected, off = 1.0, None, 0.0
+    share, n_expected, off = 1.0, None, 1.0
     if refinement is not None:
-        expected = expected_cases(refinement, grid, kind, end - time.monotonic() if sample.cases else 0.0)
-        n_expected = round(expected.n_case)
-        n_left = max(expected.n_case - float((refinement.asked().cases.ravel() & known).sum()), 0.0)
+        asked = refinement.asked()
+        n_expected = asked.n_expected
+        n_left = max(n_expected - int((asked.cases.ravel() & known).sum()), 0)
         share = min(n_left / max(int((~known).sum()), 1), 1.0)
-        off = expected.error / max(expected.n_case, 1.0)
+        off = _OFF if asked.edges is None else 1.0
     found = bound = Estimate(0.0, 0.0, 0.0)
     mostly, memory = "", 0.0
     if left:
@@ -313,8 +310,7 @@ def make_plan(study: Study, part: str | None = None, say: Callable[[str], None] 
                 n_block=touched(len(left), share, n_missing),
             )
             seconds, least, most = some.estimate()
-            wider = math.exp(2.0 * off)  # by two standard errors of the number of cases
-            found = Estimate(min(seconds, bound.seconds), least / wider, most * wider)
+            found = Estimate(min(seconds, bound.seconds), least / off, most * off)
         if sample.cases:
             memory = _memory(sample, None if study.changes_speed else cost.prepared)
             memory += _LEDGERS * grid.n_case * kind.itemsize

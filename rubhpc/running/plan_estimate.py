@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    from rubhpc.running.kept_setups import Preparations
+    from rubhpc.running.case_setup import Preparations
     from rubhpc.study.study import Study
 
 _WITHIN = 0.95  # by Student's distribution; in fact 0.8 to 0.95, as few cases rarely include the longest

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import math
 import signal
+import sys
 import tempfile
 import threading
 import time
@@ -20,12 +21,10 @@ from rubhpc.integrate.compilation import is_compiling, seconds_compiling
 from rubhpc.integrate.following import n_followed
 from rubhpc.integrate.measuring.regimes import LEAST_REVOLUTIONS
 from rubhpc.integrate.modal_setup import ModalSetup
-from rubhpc.running.case_rows import put_any
-from rubhpc.running.kept_setups import KeptSetups
-from rubhpc.running.memory import memory, peak_memory
+from rubhpc.running.case_setup import KeptSetups
 from rubhpc.running.plan_estimate import Timed, relative_error
 from rubhpc.running.warm_up import WARM, load_kernels, part_of
-from rubhpc.running.worker import record_of
+from rubhpc.running.worker import put_any, record_of
 from rubhpc.storage import layout
 from rubhpc.storage.block_files import BlockFiles
 from rubhpc.storage.disk import flush_to_disk, write_whole
@@ -48,6 +47,29 @@ if TYPE_CHECKING:
 
     AnyRecord = Record | BranchRecord | RunUpRecord
     Index = tuple[int, ...]
+
+_STATUS = Path("/proc/self/status")
+_NOW = "VmRSS:"
+_PEAK = "VmHWM:"  # of the program itself: getrusage includes the process that started it
+
+
+def peak_memory() -> float:
+    """Peak memory of this process so far, bytes."""
+    try:
+        return 1024.0 * float(_STATUS.read_text().split(_PEAK)[1].split()[0])
+    except (OSError, IndexError, ValueError):  # no Linux
+        from resource import RUSAGE_SELF, getrusage
+
+        return getrusage(RUSAGE_SELF).ru_maxrss * (1.0 if sys.platform == "darwin" else 1024.0)
+
+
+def memory() -> float:
+    """Memory of this process now, bytes; its peak where that is unknown."""
+    try:
+        return 1024.0 * float(_STATUS.read_text().split(_NOW)[1].split()[0])
+    except (OSError, IndexError, ValueError):
+        return peak_memory()
+
 
 _MOST_CASES = 200
 _FEW = 6  # cases, which share the time
@@ -122,9 +144,9 @@ class CaseTimer:
         """Cut what takes long without a check, such as a set-up, once no time is left."""
 
         def ring(*_: object) -> None:
-            if self.left <= 0.0 and not is_compiling():
+            signal.setitimer(signal.ITIMER_REAL, max(self.left, _LATE))  # again: Python drops what is raised
+            if self.left <= 0.0 and not is_compiling():  # within a callback of its garbage collector
                 raise Enough
-            signal.setitimer(signal.ITIMER_REAL, max(self.left, _LATE))
 
         if threading.current_thread() is not threading.main_thread():
             yield
@@ -451,7 +473,10 @@ def spread(missing: NDArray[np.bool_], most: int) -> Iterator[Index]:
     """
     flat = np.flatnonzero(missing)
     shape = missing.shape if flat.size > max(most, 0.2 * missing.size) else flat.shape
-    pace = roberts_pace(len(shape))
+    root = 2.0
+    for _ in range(64):  # root of x^(n + 1) = x + 1
+        root = (1.0 + root) ** (1.0 / (len(shape) + 1))
+    pace = root ** -np.arange(1.0, len(shape) + 1)
     seen: dict[int, None] = {}
     for k in range(20 * most):
         place = ((0.5 + k * pace) % 1.0 * shape).astype(int)
@@ -461,11 +486,3 @@ def spread(missing: NDArray[np.bool_], most: int) -> Iterator[Index]:
     seen |= dict.fromkeys(flat[: most if flat.size <= most else 0].tolist())  # it leaves out some of a few
     for at in seen:
         yield tuple(int(i) for i in np.unravel_index(at, missing.shape))
-
-
-def roberts_pace(n: int) -> NDArray[np.float64]:
-    """Steps of M. Roberts' sequence in n dimensions: powers of the root of x^(n + 1) = x + 1."""
-    root = 2.0
-    for _ in range(64):
-        root = (1.0 + root) ** (1.0 / (n + 1))
-    return root ** -np.arange(1.0, n + 1)
