@@ -27,10 +27,10 @@ if TYPE_CHECKING:
     from rubhpc.knocks import least_knock
     from rubhpc.periodic import periodic
     from rubhpc.rig.carriers import Carrier, MatrixCarrier
-    from rubhpc.rig.forces import Load, Unbalance
     from rubhpc.rig.probes import Probe
     from rubhpc.rig.reading import read_rig
     from rubhpc.rig.rig import Rig
+    from rubhpc.rig.rotors import Load, Unbalance
     from rubhpc.rig.stators import LumpedStator, MatrixStator, Stator
     from rubhpc.run_up import run_up
     from rubhpc.running.driver import run
@@ -80,7 +80,7 @@ _HOMES = {
     "Branch": "rubhpc.integrate.branches.branch:Branch",
     "Carrier": "rubhpc.rig.carriers:Carrier",
     "InputError": "rubhpc.errors:InputError",
-    "Load": "rubhpc.rig.forces:Load",
+    "Load": "rubhpc.rig.rotors:Load",
     "LumpedStator": "rubhpc.rig.stators:LumpedStator",
     "MatrixCarrier": "rubhpc.rig.carriers:MatrixCarrier",
     "MatrixStator": "rubhpc.rig.stators:MatrixStator",
@@ -97,7 +97,7 @@ _HOMES = {
     "StoreError": "rubhpc.errors:StoreError",
     "Study": "rubhpc.study.study:Study",
     "Summary": "rubhpc.storage.summary:Summary",
-    "Unbalance": "rubhpc.rig.forces:Unbalance",
+    "Unbalance": "rubhpc.rig.rotors:Unbalance",
     "assemble": "rubhpc.fem.assemble:assemble",
     "branch": "rubhpc.branch:branch",
     "least_knock": "rubhpc.knocks:least_knock",

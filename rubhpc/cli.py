@@ -140,7 +140,7 @@ def _code_of(args: list[str]) -> int:
     except (KeyboardInterrupt, click.Abort):
         return _report("interrupted; run the same command again", StoppedEarly.exit_code)
     except BaseException as error:  # SystemExit of a user's code included: the command has not ended
-        from rubhpc.running.crash import crash
+        from rubhpc.running.ending import crash
 
         crashed = crash(error)
         if isinstance(error, Exception) and _evaluates_store(args):

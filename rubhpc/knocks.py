@@ -6,7 +6,7 @@ from contextlib import nullcontext
 from typing import TYPE_CHECKING
 
 from rubhpc.running.knocks_on_ranks import least_knock_on, take_part
-from rubhpc.running.pool import Alone
+from rubhpc.running.pool import Pool
 from rubhpc.running.workers import start_workers
 from rubhpc.streams import lasting_streams
 
@@ -69,7 +69,7 @@ def least_knock(
         The study has axes of starts, [branch], [run_up] or [drive], a node does not move sideways, or a
         number is out of range.
     """
-    with nullcontext(Alone()) if workers == 1 else start_workers(workers, take_part) as pool:
+    with nullcontext(Pool()) if workers == 1 else start_workers(workers, take_part) as pool:
         return least_knock_on(
             pool,
             lambda: study,

@@ -14,10 +14,9 @@ from rubhpc.rig.stators import LumpedStator, Stator
 
 if TYPE_CHECKING:
     from rubhpc.rig.bearing_table import AnyBearing
-    from rubhpc.rig.parts import Disc
+    from rubhpc.rig.parts import Disc, Tube
     from rubhpc.rig.rig import Rig
     from rubhpc.rig.stators import AnyStator
-    from rubhpc.rig.tubes import Tube
 
     Point = tuple[float, float]
 

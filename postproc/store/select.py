@@ -14,8 +14,7 @@ from postproc.store.variables import require_variables
 from rubhpc.errors import InputError
 from rubhpc.input.quantity import parse_quantity
 from rubhpc.schema import VARIABLES
-from rubhpc.study.axes import coordinate_of
-from rubhpc.study.axis_values import place_of, study_unit
+from rubhpc.study.axes import coordinate_of, place_of, study_unit
 from rubhpc.study.sampling import CASE
 from rubhpc.units import typed_quantity
 

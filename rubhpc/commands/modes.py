@@ -81,12 +81,10 @@ def modes(
     from postproc.store.export import check_data_path, write_data
     from rubhpc.commands.design import plain_design, print_design
     from rubhpc.fem.assemble import assemble
-    from rubhpc.fem.constraints import FLOATS, find_rigid_body_mode
-    from rubhpc.fem.lasting import decay_message, undamped_message
     from rubhpc.fem.linear_design import linear_design
     from rubhpc.fem.modes import modes as find_modes
-    from rubhpc.fem.stability import instability_message
-    from rubhpc.fem.statics import sag_remark
+    from rubhpc.fem.stability import decay_message, instability_message, undamped_message
+    from rubhpc.fem.statics import FLOATS, find_rigid_body_mode, sag_remark
     from rubhpc.rig.reading import read_rig
 
     if nodes and shapes:
@@ -173,7 +171,7 @@ def _print_tables(
 ) -> None:
     import math
 
-    from rubhpc.fem.lasting import stator_names
+    from rubhpc.fem.stability import stator_names
 
     tables = [(f"Rotor at {spin * 30 / math.pi:g} rpm ({spin:.6g} rad/s)", rotor) for spin, rotor in found]
     for carrier, listed in carriers:
@@ -213,7 +211,7 @@ def _draw(model: Model, top_speed: float, count: int | None, path: Path) -> None
 
     from postproc.figures.drawing import house_style, new_figure, save
     from postproc.figures.linear_design import campbell_diagram
-    from rubhpc.fem.campbell import campbell, critical_speeds
+    from rubhpc.fem.critical_speeds import campbell, critical_speeds
     from rubhpc.fem.linear_design import checked_range
 
     low, high = checked_range(model, None)

@@ -3,25 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
-from typing import TYPE_CHECKING
+from functools import singledispatch
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
 
 from rubhpc.errors import InputError
 from rubhpc.fem.carrier import assemble_carrier
-from rubhpc.fem.computable import MOST_DEGREES, check_computable, computable
-from rubhpc.fem.forces import forces_on
-from rubhpc.fem.model import Model
+from rubhpc.fem.model import MOST_DEGREES, Model, check_computable, computable
 from rubhpc.fem.rotor import assemble_rotor
 from rubhpc.fem.statics import at_rest_under, sag_at
 from rubhpc.fem.stator import assemble_stator
+from rubhpc.rig.rotors import Load, Unbalance
 from rubhpc.rig.stators import Stator
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Body, CarrierModel, StatorModel
     from rubhpc.rig.rig import Rig
+    from rubhpc.rig.rotors import AnyRotor
     from rubhpc.rig.stators import AnyStator
+
+    Floats = NDArray[np.float64]
 
 
 def assemble(rig: Rig) -> Model:
@@ -130,3 +134,50 @@ def _stator(rig: Rig, stator: AnyStator) -> StatorModel:
     radius = rig.contact_radius(stator)
     assert radius is not None  # a rig refuses a stator whose contact radius is unknown
     return assemble_stator(stator, radius)
+
+
+class Lateral(NamedTuple):
+    """Force on (v, w) of a node: `constant + spin^2 (cosine cos(spin t) + sine sin(spin t))`, N and kg m."""
+
+    constant: tuple[float, float] = (0.0, 0.0)
+    cosine: tuple[float, float] = (0.0, 0.0)
+    sine: tuple[float, float] = (0.0, 0.0)
+
+
+@singledispatch
+def lateral_force(force: object) -> Lateral:
+    """Return the force on its node; register a function for each kind of force of `rubhpc.rig.rotors`."""
+    raise TypeError(f"no lateral force for {type(force).__name__}")
+
+
+@lateral_force.register(Unbalance)
+def _(force: Unbalance) -> Lateral:
+    """`m e spin^2 (cos(spin t + phase), sin(spin t + phase))`."""
+    moment = force.mass * force.radius
+    along, across = moment * np.cos(force.phase), moment * np.sin(force.phase)
+    return Lateral(cosine=(along, across), sine=(-across, along))
+
+
+@lateral_force.register(Load)
+def _(force: Load) -> Lateral:
+    return Lateral(constant=(force.vertical, force.horizontal))
+
+
+def forces_on(rotor: AnyRotor, body: Body) -> tuple[Floats, Floats, Floats]:
+    """Forces on a rotor, (n_dof,) each: constant (N), and the factors of spin^2 cos and spin^2 sin (kg m).
+
+    Gravity acts along -v on every mass, `-g M e` with e = 1 on every "v". A component along which a node is
+    constrained has no effect.
+    """
+    upwards = np.array([float(name == "v") for _, name in body.degrees])
+    cosine, sine = np.zeros((2, body.n_dof))
+    constant: Floats = -rotor.gravity * (body.mass @ upwards)
+    for _, force in rotor.node_forces():
+        parts = lateral_force(force)
+        for i_direction, name in enumerate(("v", "w")):
+            row = body.index(rotor.node_of(force), name)
+            if row >= 0:
+                constant[row] += parts.constant[i_direction]
+                cosine[row] += parts.cosine[i_direction]
+                sine[row] += parts.sine[i_direction]
+    return constant, cosine, sine

@@ -10,12 +10,15 @@ import xarray as xr
 
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble, model_at
-from rubhpc.fem.campbell import campbell, follow_modes
-from rubhpc.fem.critical_speeds import CriticalSpeed, find_critical_speeds
+from rubhpc.fem.critical_speeds import CriticalSpeed, campbell, find_critical_speeds, follow_modes
 from rubhpc.fem.response import check_response_node, first_lateral_frequency, response_nodes
-from rubhpc.fem.separation_margin import amplitude_over_speed, grid_through, response_peaks
+from rubhpc.fem.separation_margin import (
+    amplitude_over_speed,
+    grid_through,
+    response_peaks,
+    unbalance_response,
+)
 from rubhpc.fem.stability import logarithmic_decrement, threshold_speed
-from rubhpc.fem.unbalance_response import unbalance_response
 from rubhpc.rig.rotors import Rotor
 from rubhpc.threads import on_one_thread
 

@@ -9,15 +9,13 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import eig
+from scipy.linalg import LinAlgError, eig, eigh, null_space
 
 from rubhpc.errors import InputError
-from rubhpc.fem.computable import FAR_APART
-from rubhpc.fem.undamped import EPS, undamped_modes
-from rubhpc.fem.whirl import planar_twins, whirl_word
+from rubhpc.fem.model import FAR_APART
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -25,6 +23,72 @@ if TYPE_CHECKING:
 
     Vector = NDArray[np.complex128]
     Pair = tuple[complex, complex, Vector]
+    Matrix = NDArray[np.float64]
+
+EPS = float(np.finfo(np.float64).eps)
+
+
+def undamped_modes(mass: Matrix, stiffness: Matrix) -> tuple[Matrix, Matrix]:
+    """Solve `K x = w^2 M x`.
+
+    Parameters
+    ----------
+    mass, stiffness : (n_dof, n_dof)
+        Symmetric, the mass positive definite.
+
+    Returns
+    -------
+    square : (n_dof,)
+        w^2, rad^2/s^2: exactly 0 for a rigid body's modes, which come first, then rising.
+    basis : (n_dof, n_dof)
+        Shapes as columns, `basis^T M basis = 1`.
+
+    Raises
+    ------
+    InputError
+        When the matrices are too ill-conditioned.
+
+    Notes
+    -----
+    The eigenvalues of `(K, M)` carry the rounding of the highest, that of a short stiff element. Those of
+    `(M, K)` are 1/w^2, exact for the lowest, and inexact only for frequencies some 1e7 times as high.
+    """
+    try:
+        return _undamped_modes(mass, stiffness)
+    except (LinAlgError, ValueError):  # which scipy raises for what is not finite
+        raise InputError(f"modes: {FAR_APART}") from None
+
+
+def _undamped_modes(mass: Matrix, stiffness: Matrix) -> tuple[Matrix, Matrix]:
+    rigid = _rigid_shapes(mass, stiffness)
+    if rigid.shape[1] == len(mass):
+        return np.zeros(len(mass)), rigid
+    complement = null_space((mass @ rigid).T) if rigid.size else np.eye(len(mass))
+    M, K = (complement.T @ matrix @ complement for matrix in (mass, stiffness))
+    try:
+        flexibility, shapes = eigh(M, K)
+    except LinAlgError:  # not positive definite: a negative stiffness
+        square, shapes = eigh(K, M)
+    else:
+        flexibility = np.maximum(flexibility, EPS * flexibility.max())[::-1]
+        square, shapes = 1 / flexibility, shapes[:, ::-1] / np.sqrt(flexibility)
+    return np.append(np.zeros(rigid.shape[1]), square), np.hstack([rigid, complement @ shapes])
+
+
+def _rigid_shapes(mass: Matrix, stiffness: Matrix) -> Matrix:
+    """Motions that meet no stiffness, (n_dof, n_rigid), of unit modal mass.
+
+    They are the null space of K scaled to a unit diagonal, whose smallest other value falls only with the
+    number of elements, not with the frequencies of the mesh.
+    """
+    scale = np.sqrt(np.abs(np.diag(stiffness)))
+    scale[scale == 0.0] = 1.0
+    values, vectors = eigh(stiffness / np.outer(scale, scale))
+    shapes = vectors[:, np.abs(values) < 4 * len(values) * EPS] / scale[:, np.newaxis]
+    to_unit_mass = np.linalg.inv(np.linalg.cholesky(shapes.T @ mass @ shapes)).T
+    rigid: Matrix = shapes @ to_unit_mass
+    return rigid
+
 
 # Kind of motion by degree. Beams do not couple the kinds; user-supplied matrices may.
 KINDS = {
@@ -266,3 +330,66 @@ def _mode(first: complex, second: complex, shape: Vector, kind: str, whirl: str)
         eigenvalue=first,
         shape=shape,
     )
+
+
+# A mode of index 1e-3 moves on ellipses 2000 times as long as wide.
+PLANAR = 1e-3
+AT_REST = 0.01  # of the largest amplitude of a mode: less is a node of it
+
+
+def whirl_index(shape: Vector, mass: NDArray[np.float64], names: Sequence[str]) -> float:
+    """Forward less backward kinetic energy over their sum: 1 turns from y to z, -1 from z to y, 0 is planar.
+
+    The motion `v + i w` (and `thz - i thy`, the tilt) of `Re(shape exp(i omega t))` is a sum of
+    `F exp(i omega t)` and `conj(B) exp(-i omega t)`. Weighting with the mass adds up what different nodes
+    do: some may whirl forward while others whirl backward.
+
+    Parameters
+    ----------
+    shape : (n_dof,) complex
+        With exp(i omega t), omega positive.
+    mass : (n_dof, n_dof)
+        Of the lateral degrees, equal in both planes.
+    names : sequence of str
+        Which degree each row is: "v", "w", "thy", "thz", all at every node.
+    """
+    vertical, horizontal, sign = _planes(names)
+    plane_mass = mass[np.ix_(vertical, vertical)]
+    V, W = shape[vertical], sign * shape[horizontal]
+    forward, backward = V + 1j * W, V - 1j * W
+    energy = [float(np.real(part.conj() @ plane_mass @ part)) for part in (forward, backward)]
+    total = energy[0] + energy[1]
+    return (energy[0] - energy[1]) / total if total > 0.0 else 0.0
+
+
+def planar_twins(first: Vector, second: Vector, names: Sequence[str]) -> tuple[Vector, Vector]:
+    """Vertical and horizontal modes that span the same motions as two modes of one eigenvalue."""
+    vertical, horizontal, _ = _planes(names)
+    span = np.stack([first, second], axis=1)
+    # of all their combinations, the one with least horizontal motion, then the one with least vertical
+    least_horizontal = np.linalg.svd(span[horizontal])[2][-1].conj()
+    least_vertical = np.linalg.svd(span[vertical])[2][-1].conj()
+    return span @ least_horizontal, span @ least_vertical
+
+
+def whirl_word(shape: Vector, mass: NDArray[np.float64], names: Sequence[str], spin: float) -> str:
+    """Return "forward" for a whirl in the sense of the spin (at standstill: of positive spin).
+
+    "mixed" where some nodes whirl forward and others backward; nodes that hardly move do not count.
+    """
+    V, W = (shape[[row for row, n in enumerate(names) if n == name]] for name in ("v", "w"))
+    size, area = np.abs(V) ** 2 + np.abs(W) ** 2, 2.0 * np.imag(V * W.conj())
+    moves = size > AT_REST**2 * size.max(initial=0.0)
+    if (area > PLANAR * size)[moves].any() and (area < -PLANAR * size)[moves].any():
+        return "mixed"
+    index = whirl_index(shape, mass, names)
+    if abs(index) < PLANAR:
+        return "planar"
+    return "forward" if (index > 0.0) == (spin >= 0.0) else "backward"
+
+
+def _planes(names: Sequence[str]) -> tuple[list[int], list[int], NDArray[np.float64]]:
+    """Rows of either plane in the same order, and the signs of the horizontal ones (-thy bends w up)."""
+    vertical = [row for name in ("v", "thz") for row, n in enumerate(names) if n == name]
+    horizontal = [row for name in ("w", "thy") for row, n in enumerate(names) if n == name]
+    return vertical, horizontal, np.array([-1.0 if names[row] == "thy" else 1.0 for row in horizontal])

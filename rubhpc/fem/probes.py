@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.errors import InputError
+from rubhpc.fem.beam import rayleigh_coefficients
 from rubhpc.fem.carrier import own_matrices
-from rubhpc.fem.damping import rayleigh_coefficients
 from rubhpc.fem.model import ProbeRows
 from rubhpc.fem.statics import sag_at
 from rubhpc.rig.bearing_table import BearingTable

@@ -11,8 +11,7 @@ import numpy as np
 from scipy.linalg import eigvals, eigvalsh
 
 from rubhpc.errors import InputError
-from rubhpc.fem.modes import KINDS, modes
-from rubhpc.fem.undamped import undamped_modes
+from rubhpc.fem.modes import KINDS, modes, undamped_modes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

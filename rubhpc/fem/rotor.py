@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.fem.beam import ROTOR_DEGREES, join, rotor_elements
-from rubhpc.fem.damping import rayleigh_coefficients
+from rubhpc.fem.beam import ROTOR_DEGREES, join, rayleigh_coefficients, rotor_elements
 from rubhpc.fem.model import Body, SpeedDependence, Support, couple
 from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.rig.rotors import MatrixRotor, Rotor

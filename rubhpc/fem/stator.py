@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.fem.beam import STATOR_DEGREES, join, stator_element, stator_foreshortening
-from rubhpc.fem.damping import rayleigh_coefficients
+from rubhpc.fem.beam import STATOR_DEGREES, join, rayleigh_coefficients, stator_element, stator_foreshortening
 from rubhpc.fem.model import Body, StatorModel
 from rubhpc.rig.stators import SECOND_ORDER, LumpedStator, MatrixStator, Stator
 
@@ -17,6 +16,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.rig.stators import Seat
+
+    Matrix = NDArray[np.float64]
 
 
 @singledispatch
@@ -43,24 +44,15 @@ def _(stator: Stator, radius: float) -> StatorModel:
     rows = np.ix_(free, free)
     alpha, beta = rayleigh_coefficients(stator.damping)
     M, K = beam.mass[rows], beam.stiffness[rows]
-    body = Body(
-        mass=M,
-        damping=alpha * M + beta * K,
+    return _model(
+        stator,
+        radius,
+        (M, alpha * M + beta * K, K),
+        tuple(degrees[row] for row in free),
+        tip=tip,
         gyroscopic=beam.gyroscopic[rows],
-        stiffness=K,
-        degrees=tuple(degrees[row] for row in free),
-    )
-    return StatorModel(
-        body=body,
-        node=stator.node,
-        angle=stator.angle,
-        radius=radius,
-        clearance_offset=stator.clearance_offset,
         length=stator.length,
         euler_load=stator.euler_load,
-        strength=_strength(stator),
-        axial=body.index(tip, "axial"),
-        lateral=body.index(tip, "lateral"),
         squared_slope=stator_foreshortening(stator)[rows] if stator.geometry == SECOND_ORDER else None,
     )
 
@@ -69,7 +61,7 @@ def _(stator: Stator, radius: float) -> StatorModel:
 def _(stator: MatrixStator, radius: float) -> StatorModel:
     assert stator.damping is not None
     degrees = tuple((1, name) for name in stator.degrees)
-    return _without_length(stator, radius, stator.mass, stator.damping, stator.stiffness, degrees)
+    return _model(stator, radius, (stator.mass, stator.damping, stator.stiffness), degrees)
 
 
 @assemble_stator.register(LumpedStator)
@@ -83,27 +75,27 @@ def _(stator: LumpedStator, radius: float) -> StatorModel:
         values.append((mass, stator.lateral_damping, stator.lateral_stiffness))
     table = np.array(values, dtype=np.float64).reshape(-1, 3)
     M, C, K = (np.diag(column) for column in table.T)
-    return _without_length(stator, radius, M, C, K, tuple((1, name) for name in names))
+    return _model(stator, radius, (M, C, K), tuple((1, name) for name in names))
 
 
-def _strength(seat: Seat) -> float:
-    """Contact force that it bears, N; infinite where none is given."""
-    return math.inf if seat.strength is None else seat.strength
-
-
-def _without_length(
+def _model(
     seat: Seat,
     radius: float,
-    mass: NDArray[np.float64],
-    damping: NDArray[np.float64],
-    stiffness: NDArray[np.float64],
+    matrices: tuple[Matrix, Matrix, Matrix],
     degrees: tuple[tuple[int, str], ...],
+    *,
+    tip: int = 1,
+    gyroscopic: Matrix | None = None,
+    length: float = math.inf,
+    euler_load: float = math.inf,
+    squared_slope: Matrix | None = None,
 ) -> StatorModel:
-    """Return a stator without a length and an Euler load: both are infinite."""
+    """Return a stator by its mass, damping and stiffness; without a length nothing depends on it."""
+    mass, damping, stiffness = matrices
     body = Body(
         mass=mass,
         damping=damping,
-        gyroscopic=np.zeros_like(mass),
+        gyroscopic=np.zeros_like(mass) if gyroscopic is None else gyroscopic,
         stiffness=stiffness,
         degrees=degrees,
     )
@@ -113,9 +105,10 @@ def _without_length(
         angle=seat.angle,
         radius=radius,
         clearance_offset=seat.clearance_offset,
-        length=math.inf,
-        euler_load=math.inf,
-        strength=_strength(seat),
-        axial=body.index(1, "axial"),
-        lateral=body.index(1, "lateral"),
+        length=length,
+        euler_load=euler_load,
+        strength=math.inf if seat.strength is None else seat.strength,
+        axial=body.index(tip, "axial"),
+        lateral=body.index(tip, "lateral"),
+        squared_slope=squared_slope,
     )

@@ -3,17 +3,283 @@
 from __future__ import annotations
 
 import dataclasses
+import operator
 from dataclasses import MISSING, field
 from numbers import Integral
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rubhpc.errors import InputError
-from rubhpc.input.kinds import KINDS
-from rubhpc.input.messages import place
+from rubhpc.errors import InputError, printable
+from rubhpc.input.matrix import encode_matrix, parse_matrix
+from rubhpc.input.messages import brief, nearest, place, quoted
+from rubhpc.input.quantity import out_of_range, parse_quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
+
+    Limits = Mapping[str, Any]  # what the declaration says: unit, bounds, words, example
+
+
+class Kind(NamedTuple):
+    """What a kind of field does with a value."""
+
+    parse: Callable[[Any, Limits, str], Any]  # value, limits, start of messages
+    check: Callable[[Any, Limits], str] = lambda value, limits: ""  # the problem
+    encode: Callable[[Any], Any] = lambda value: value  # to what TOML and JSON hold
+
+
+def _parse_quantity(value: object, limits: Limits, where: str) -> float | str:
+    words = limits.get("or_words", ())
+    if isinstance(value, str) and value in words:
+        return value
+    try:
+        return parse_quantity(value, limits["unit"], where)
+    except InputError as error:
+        if not words:
+            raise
+        raise InputError(f"{error}, or {quoted(words)}") from None
+
+
+def _check_quantity(value: object, limits: Limits) -> str:
+    if isinstance(value, str) and value in limits.get("or_words", ()):
+        return ""
+    unit = f" {limits['unit']}" if limits["unit"] else ""
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        return f"{brief(value)} is not a number; give one in SI units"
+    if problem := out_of_range(number):
+        return f"{brief(value)} {problem}"
+    for word, holds in (("above", number.__gt__), ("at_least", number.__ge__), ("below", number.__lt__)):
+        limit = limits[word]
+        if limit is not None and not holds(limit):
+            return f"{number:g}{unit} is out of range; it must be {word.replace('_', ' ')} {limit:g}"
+    return ""
+
+
+def _parse_series(value: Any, limits: Limits, where: str) -> tuple[float, ...]:
+    listed = value.tolist() if hasattr(value, "tolist") else value  # an array
+    values = listed if isinstance(listed, list | tuple) else [listed]
+    return tuple(parse_quantity(v, limits["unit"], f"{where}: value {i}") for i, v in enumerate(values, 1))
+
+
+def _check_series(values: Any, limits: Limits) -> str:
+    if not isinstance(values, tuple) or not values:
+        return f"{brief(values)} is not a list of numbers; give one or more"
+    problems = (
+        f"value {i}: {problem}" for i, v in enumerate(values, 1) if (problem := _check_quantity(v, limits))
+    )
+    return next(problems, "")
+
+
+def _parse_count(value: object, limits: Limits, where: str) -> int | str:
+    if isinstance(value, str) and value in limits["or_words"]:
+        return value
+    if isinstance(value, str) and value in limits["gone"]:
+        raise InputError(f"{where}: {limits['gone'][value]}")
+    if isinstance(value, float) and value.is_integer():
+        return int(value)  # an axis holds floats
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        words = "".join(f', or "{word}"' for word in limits["or_words"])
+        raise InputError(
+            f"{where}: {brief(value)} is not a whole number; write one such as 12, without quotes{words}"
+        )
+    return int(value)
+
+
+def _check_count(value: object, limits: Limits) -> str:
+    if isinstance(value, str) and value in limits["or_words"]:
+        return ""
+    if isinstance(value, str) and value in limits["gone"]:
+        return str(limits["gone"][value])
+    if type(value) is not int and (isinstance(value, bool) or not isinstance(value, Integral)):
+        words = "".join(f', or "{word}"' for word in limits["or_words"])
+        return f"{brief(value)} is not a whole number; give one such as 12{words}"
+    if int(value) < limits["at_least"]:
+        return f"{brief(value)} is out of range; it must be at least {limits['at_least']}"
+    if limits["at_most"] is not None and int(value) > limits["at_most"]:
+        return f"{brief(value)} is out of range; it must be at most {limits['at_most']}"
+    return ""
+
+
+def _parse_flag(value: object, _: Limits, where: str) -> bool:
+    if isinstance(value, float) and value in (0.0, 1.0):
+        return bool(value)  # an axis holds floats
+    if not isinstance(value, bool):
+        raise InputError(
+            f"{where}: {brief(value)} is neither true nor false; write one of them, without quotes"
+        )
+    return value
+
+
+def _check_flag(value: object, _: Limits) -> str:
+    return "" if isinstance(value, bool) else f"{brief(value)} is neither true nor false"
+
+
+def _parse_text(value: object, limits: Limits, where: str) -> str:
+    if not isinstance(value, str):
+        raise InputError(f"{where}: {brief(value)} is not text; write it in quotes, {limits['example']}")
+    return value
+
+
+def _check_text(value: object, _: Limits) -> str:
+    if not isinstance(value, str):
+        return f"{brief(value)} is not text; write it in quotes"
+    if not value.strip() or not value.isprintable():
+        return f"{brief(value)} is not a line of text; give one without control characters"
+    return ""
+
+
+def _check_choice(value: object, limits: Limits) -> str:
+    if value in limits["of"]:
+        return ""
+    return f"{brief(value)} is not available; choose one of {quoted(limits['of'])}"
+
+
+def _parse_choices(value: object, limits: Limits, where: str) -> tuple[Any, ...]:
+    if not isinstance(value, list | tuple):
+        raise InputError(
+            f"{where}: {brief(value)} is not a list; write [{quoted(limits['of'])}] or part of it"
+        )
+    return tuple(value)
+
+
+def _check_choices(value: Any, limits: Limits) -> str:
+    for word in value:
+        if problem := _check_choice(word, limits):
+            return problem
+        if value.count(word) > 1:
+            return f"{brief(word)} is duplicated; remove one"
+    return ""
+
+
+def _parse_words(value: object, limits: Limits, where: str) -> tuple[str, ...]:
+    if not isinstance(value, list | tuple) or not all(isinstance(word, str) for word in value):
+        raise InputError(f"{where}: {brief(value)} is not a list of words; write {limits['example']}")
+    return tuple(value)
+
+
+def _parse_matrix(value: object, _: Limits, where: str) -> Any:
+    return parse_matrix(value, where)
+
+
+def _parse_degrees(value: object, _: Limits, where: str) -> tuple[tuple[int, str], ...]:
+    fix = 'write a node and a name for each row, [[1, "v"], [1, "w"]]'
+    try:
+        pairs = [(node, name) for node, name in value]  # type: ignore[attr-defined]
+    except (TypeError, ValueError):
+        raise InputError(f"{where}: {brief(value)} is not a list of degrees; {fix}") from None
+    degrees = []
+    for node, name in pairs:
+        try:
+            number = 0 if isinstance(node, bool) else operator.index(node)  # numpy's whole numbers too
+        except TypeError:
+            number = 0
+        if number < 1 or not isinstance(name, str):
+            raise InputError(f"{where}: {brief((node, name))} is not a degree; {fix}")
+        degrees.append((number, str(name)))
+    return tuple(degrees)
+
+
+def _parse_criteria(value: object, limits: Limits, where: str) -> tuple[tuple[str, float], ...]:
+    """Flags by name, measures as tables `{ name = tolerance }`; one of them needs no list."""
+    pairs: list[tuple[str, float]] = []
+    for entry in value if isinstance(value, list | tuple) else [value]:
+        if isinstance(entry, str):
+            pairs.append((entry, 0.0))
+        elif isinstance(entry, dict):
+            pairs += [(name, parse_quantity(share, "", f"{where}: {name}")) for name, share in entry.items()]
+        else:
+            raise InputError(
+                f"{where}: {brief(entry)} is neither a flag nor a measure; write {limits['example']}"
+            )
+    return tuple(pairs)
+
+
+def _check_criteria(value: Any, limits: Limits) -> str:
+    if not value:
+        return "empty; give at least one flag or measure"
+    flags, measures = limits["flags"], limits["measures"]
+    names = [name for name, _ in value]
+    for name, share in value:
+        if names.count(name) > 1:
+            return f"{name} is duplicated; remove one"
+        if name in measures and not 0.0 < share < 1.0:
+            return f"{name} needs a relative difference between 0 and 1; write {{ {name} = 0.1 }}"
+        if name in flags and share:
+            return f'{name} is a flag, which has no difference; write "{name}"'
+        if name not in flags and name not in measures:
+            return f"{brief(name)} is neither a flag nor a measure; {nearest(name, [*flags, *measures])}"
+    return ""
+
+
+def _parse_selection(value: object, limits: Limits, where: str) -> tuple[tuple[str, str | float], ...]:
+    if not isinstance(value, dict):
+        raise InputError(f"{where}: {brief(value)} is not a table; write {limits['example']}")
+    found: list[tuple[str, str | float]] = []
+    for name, one in value.items():
+        if isinstance(one, dict):  # `stator.angle = 0` without quotes
+            found += [(f"{name}.{rest}", entry) for rest, entry in _parse_selection(one, limits, where)]
+        elif isinstance(one, bool) or not isinstance(one, str | int | float):
+            raise InputError(f"{where}.{name}: {brief(one)} is not a value; write {limits['example']}")
+        else:
+            found.append((name, one if isinstance(one, str) else float(one)))
+    return tuple(found)
+
+
+def _parse_pairs(value: object, limits: Limits, where: str) -> tuple[tuple[float, float], ...]:
+    """Pairs from a table of numbers; to TOML a bare `31.56` is the table 31 with the key 56."""
+    key_unit, unit = limits["units"]
+    if isinstance(value, list) and all(isinstance(pair, list) and len(pair) == 2 for pair in value):
+        return tuple((parse_quantity(a, key_unit, where), parse_quantity(b, unit, where)) for a, b in value)
+    if not isinstance(value, dict):
+        raise InputError(f"{where}: {brief(value)} contains no pairs; write {limits['example']}")
+    flat: dict[str, object] = {}
+    for key, entry in value.items():
+        inner = entry.items() if isinstance(entry, dict) else [(None, entry)]
+        flat.update({key if tail is None else f"{key}.{tail}": v for tail, v in inner})
+    return tuple(
+        (parse_quantity(_spelled(key), key_unit, at), parse_quantity(entry, unit, at))
+        for key, entry in flat.items()
+        for at in [f"{where} {printable(key[:80])}"]
+    )
+
+
+def _spelled(text: str) -> object:
+    """Return the number that a key spells, or the key itself if it has a unit."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def _encode_quantity(value: float | str) -> float | str:
+    return value if isinstance(value, str) else float(value)
+
+
+def _encode_degrees(value: Any) -> list[list[Any]]:
+    return [list(degree) for degree in value]
+
+
+def _encode_pairs(value: Any) -> dict[str, float]:
+    return {repr(float(key)): float(number) for key, number in value}
+
+
+KINDS = {
+    "quantity": Kind(_parse_quantity, _check_quantity, encode=_encode_quantity),
+    "series": Kind(_parse_series, _check_series, encode=list),
+    "count": Kind(_parse_count, _check_count),
+    "flag": Kind(_parse_flag, _check_flag),
+    "text": Kind(_parse_text, _check_text),
+    "choice": Kind(_parse_text, _check_choice),
+    "choices": Kind(_parse_choices, _check_choices, encode=list),
+    "words": Kind(_parse_words, encode=list),
+    "criteria": Kind(_parse_criteria, _check_criteria, encode=_encode_degrees),
+    "selection": Kind(_parse_selection, encode=dict),
+    "pairs": Kind(_parse_pairs, encode=_encode_pairs),
+    "matrix": Kind(_parse_matrix, encode=encode_matrix),
+    "degrees": Kind(_parse_degrees, encode=_encode_degrees),
+}
 
 
 class FieldError(InputError):

@@ -10,10 +10,10 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from rubhpc.errors import InputError
-from rubhpc.fem.constraints import rigid_body_row
 from rubhpc.fem.model import state_size
 from rubhpc.fem.response import check_response_node, steady_response
 from rubhpc.fem.stability import instability_message
+from rubhpc.fem.statics import rigid_body_row
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.packing import degrees_of
 from rubhpc.integrate.record import State

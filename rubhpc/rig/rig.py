@@ -9,20 +9,47 @@ from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from rubhpc.input.fields import FieldError, check_fields, parse_field, table, text
+from rubhpc.input.messages import nearest
 from rubhpc.input.quantity import parse_quantity
 from rubhpc.input.reading import plain
-from rubhpc.rig.carriers import AnyCarrier  # noqa: TC001 - annotations are read when a rig is built
-from rubhpc.rig.carrying import check_carriers
-from rubhpc.rig.forces import UNLOADED
+from rubhpc.rig.carriers import AnyCarrier
 from rubhpc.rig.parts import FIXED_AT_NODE_1, Torsion
 from rubhpc.rig.ross import rotor_from_ross
-from rubhpc.rig.rotors import AnyRotor, MatrixRotor
+from rubhpc.rig.rotors import UNLOADED, AnyRotor, MatrixRotor
 from rubhpc.rig.stators import AnyStator, single_stators
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rubhpc.rig.forces import Load, Unbalance
+    from rubhpc.rig.carriers import AnyCarrier
+    from rubhpc.rig.rotors import Load, Unbalance
+    from rubhpc.rig.stators import AnyStator
+
+
+def check_carriers(carriers: Sequence[AnyCarrier], stators: Sequence[AnyStator]) -> None:
+    """Refuse carriers without stators, stators on carriers that are not there, and those that cannot follow.
+
+    Raises
+    ------
+    FieldError
+        Names the carrier or stator.
+    """
+    names = [carrier.name for carrier in carriers]
+    for i, name in enumerate(names, 1):
+        if names.count(name) > 1:
+            raise FieldError(f"carrier.{i}.name", f"{name} is duplicated; give every carrier its own name")
+    for i, stator in enumerate(stators, 1):
+        if stator.carrier is None:
+            continue
+        if stator.carrier not in names:
+            fix = nearest(stator.carrier, names) if names else "add [[carrier]] with this name"
+            raise FieldError(f"stator.{i}.carrier", f"no carrier is named {stator.carrier}; {fix}")
+        if stator.carrier_problem:
+            raise FieldError(f"stator.{i}.carrier", stator.carrier_problem)
+    for i, name in enumerate(names, 1):
+        if all(stator.carrier != name for stator in stators):
+            problem = "no stator stands on it"
+            raise FieldError(f"carrier.{i}.name", f'{problem}; give one carrier = "{name}", or remove it')
 
 
 @dataclass(frozen=True, kw_only=True)

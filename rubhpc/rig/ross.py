@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.rig.forces import Unbalance
+    from rubhpc.rig.rotors import Unbalance
 
 # For each degree of a node here: its name, the one of ROSS, and its sign.
 _DEGREES = (("u", 2, 1), ("v", 1, 1), ("w", 0, -1), ("thx", 5, 1), ("thy", 4, 1), ("thz", 3, -1))

@@ -6,7 +6,7 @@ Every kind of rotor has the forces of `RotorForces`, a `displacement_limit` and 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -17,7 +17,6 @@ from rubhpc.input.fields import FieldError, check_fields, count, degrees, matrix
 from rubhpc.input.matrix import is_symmetric
 from rubhpc.input.messages import nearest
 from rubhpc.rig.bearing_table import AnyBearing, BearingTable
-from rubhpc.rig.forces import RotorForces
 from rubhpc.rig.matrix_body import check_body, checked_matrices
 from rubhpc.rig.parts import (
     FIXED_AT_NODE_1,
@@ -29,12 +28,92 @@ from rubhpc.rig.parts import (
     Sleeve,
     Torsion,
 )
+from rubhpc.rig.supports import Placed
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
-    from rubhpc.rig.places import Placed
     from rubhpc.rig.supports import Pedestal
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unbalance(Placed):
+    """A mass at a radius, fixed to the rotor."""
+
+    mass: float = quantity("kg", doc="Unbalance mass.", example='"8 g"', at_least=0)
+    radius: float = quantity("m", doc="Distance of the mass from the axis.", example='"4.5 cm"', at_least=0)
+    phase: float = quantity(
+        "rad", doc="Angle from +y towards +z at time zero.", example='"90 deg"', default=0.0
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Load(Placed):
+    """A constant force, such as that of a belt."""
+
+    vertical: float = quantity(
+        "N", doc="Vertical component, positive upwards (+y).", example='"-120 N"', default=0.0
+    )
+    horizontal: float = quantity(
+        "N", doc="Horizontal component, positive along +z.", example='"30 N"', default=0.0
+    )
+
+
+UNLOADED, STANDSTILL = "unloaded", "standstill"
+NodeForce: TypeAlias = Unbalance | Load
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RotorForces:
+    """Forces on a rotor other than contact."""
+
+    unbalance: tuple[Unbalance, ...] = table(doc="Unbalance masses.", default=())
+    load: tuple[Load, ...] = table(doc="Constant forces.", default=())
+    gravity: float = quantity(
+        "m/s^2",
+        doc="Gravitational acceleration, towards -y.",
+        example='"9.81 m/s^2"',
+        default=0.0,
+        at_least=0,
+    )
+    clearance_from: float | str = quantity(
+        "rad/s",
+        doc="About which position of the shaft stators are set: without loads, or where the loads hold it at "
+        "standstill or at a speed.",
+        example='"standstill"',
+        default=UNLOADED,
+        at_least=0,
+        or_words=(UNLOADED, STANDSTILL),
+        added=True,
+    )
+
+    @property
+    def aligned_at(self) -> float | None:
+        """Speed, rad/s, of the shaft about which stators are set; None where it bears no loads."""
+        if isinstance(self.clearance_from, str):
+            return None if self.clearance_from == UNLOADED else 0.0
+        return self.clearance_from
+
+    def node_forces(self) -> Iterator[tuple[str, NodeForce]]:
+        """Yield every force at a node with its dotted key, "load.1"."""
+        for declared in fields(RotorForces):
+            value = getattr(self, declared.name)
+            if isinstance(value, tuple):
+                yield from ((f"{declared.name}.{i}", force) for i, force in enumerate(value, 1))
+
+    def node_of(self, part: Placed, key: str = "") -> int:
+        """Return the node of a part; a rotor whose nodes have positions finds the one at its position.
+
+        Parameters
+        ----------
+        part : Placed
+        key : str
+            Dotted key of the part, for messages.
+        """
+        if part.node is None:
+            raise FieldError(f"{key}.position", "this kind of rotor has no positions; give node")
+        return part.node
+
 
 DIVERGED_SHARE = 0.1  # of the shaft length: lateral motion that no rotor survives
 AT_A_NODE = 1e-6  # of the shaft length: a position that far from a node counts as at it

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
+from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.periodic_motions.family import CLEARANCES, SPEEDS, Operation
 from rubhpc.integrate.setup import prepare
+from rubhpc.storage.resume import missing_share
 from rubhpc.study.drive_law import DriveLaw
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from rubhpc.fem.model import Model
     from rubhpc.integrate.setup import Setup
+    from rubhpc.rig.rig import Rig
     from rubhpc.study.cases import Case, CaseGrid
+    from rubhpc.study.contact_keys import Contact
     from rubhpc.study.study import Study
-
 
 _ENOUGH_STATORS = 2  # a single pair is treated differently from several
 
@@ -62,3 +70,86 @@ def operation_of(grid: CaseGrid, case: Case) -> Operation:
         integrator=grid.study.integrator,
         samples_per_revolution=grid.study.recording.samples_per_revolution,
     )
+
+
+MOST_SETUPS = 4  # a block shares one, and neighbours often do
+MOST_BYTES = 2**30  # of contact modes, without those of the current case; those of 32 stators fill a gigabyte
+_MOST_COUNTED = 2_000  # cases in which preparations are counted
+
+
+class KeptSetups:
+    """The latest set-ups of a study."""
+
+    def __init__(self, study: Study) -> None:
+        self._study = study
+        self._kept: OrderedDict[tuple[int, float, Contact, float], tuple[Rig, Setup]] = OrderedDict()
+
+    def of(self, case: Case) -> Setup:
+        """Set-up that the cases of this rig, speed and contact share."""
+        key = (
+            id(case.rig),
+            case.speed,
+            case.contact,
+            case.speed_law.inertia or 0.0 if isinstance(case.speed_law, DriveLaw) else 0.0,
+        )  # a rig that is kept here keeps its id; hashing it takes as long as a block
+        if key in self._kept:
+            setup = self._kept[key][1]
+        else:
+            model = next((kept.model for rig, kept in self._kept.values() if rig is case.rig), None)
+            setup = set_up(self._study, case, model)
+            self._kept[key] = (case.rig, setup)
+            if len(self._kept) > MOST_SETUPS:
+                self._kept.popitem(last=False)
+        if isinstance(setup, ModalSetup) and len(setup.model.stators) > 1:
+            self._make_room(setup, case.friction)
+        return setup
+
+    def _make_room(self, setup: Setup, friction: float) -> None:
+        """Free contact modes that the case does not need, the oldest set-up's first, until few are left.
+
+        Those that are met again are solved again, with the same bits.
+        """
+        held = [kept for _, kept in self._kept.values() if isinstance(kept, ModalSetup)]
+        n_byte = {(i, mu): n for i, kept in enumerate(held) for mu, n in kept.n_byte.items()}
+        total = sum(n_byte.values())
+        for (i, mu), n in n_byte.items():
+            if total > MOST_BYTES and not (held[i] is setup and mu == friction):
+                held[i].forget(mu)
+                total -= n
+
+
+class Preparations(NamedTuple):
+    """How many times a rank that computes all alone prepares a speed, and a friction."""
+
+    speed: float
+    friction: float
+
+    def for_some(self, share: float, n_case: int) -> Preparations:
+        """Those of a share of the `n_case` cases, anywhere among them: what no case needs is not prepared."""
+        return Preparations(*(touched(n, share, n_case) for n in self))
+
+
+def touched(n: float, share: float, n_case: float) -> float:
+    """How many of n groups of `n_case` cases hold one of a share of these, anywhere among them."""
+    return n * (1.0 - (1.0 - share) ** (n_case / n)) if n and share < 1.0 else n
+
+
+def count_preparations(grid: CaseGrid, missing: NDArray[np.bool_]) -> Preparations:
+    """Go through missing cases in the order of a run; of many the first stand for the others."""
+    counted, speeds, frictions = 0, 0, 0
+    kept: OrderedDict[tuple[float, ...], set[float]] = OrderedDict()  # frictions of each set-up
+    for block in (b for sequence in grid.sequences() for b in sequence if missing_share(b, missing)):
+        if counted >= _MOST_COUNTED:
+            break
+        window = tuple(slice(s, s + n) for s, n in zip(block.start, block.shape, strict=True))
+        for place in np.argwhere(missing[window]) + np.array(block.start):
+            key, friction = grid.setup_values(place.tolist())
+            speeds += key not in kept
+            known = kept.setdefault(key, set())
+            if len(kept) > MOST_SETUPS:
+                kept.popitem(last=False)
+            frictions += friction not in known
+            known.add(friction)
+            counted += 1
+    scale = int(missing.sum()) / max(counted, 1)
+    return Preparations(scale * speeds, scale * frictions)

@@ -12,8 +12,7 @@ import numpy as np
 
 from rubhpc.running.pool import Totals, together
 from rubhpc.running.progress import Progress
-from rubhpc.running.watchdog import Watchdog
-from rubhpc.running.worker import Worker
+from rubhpc.running.worker import Watchdog, Worker
 from rubhpc.storage.disk import disk_errors, flush_to_disk
 from rubhpc.storage.in_progress import InProgress
 from rubhpc.storage.resume import missing_share
@@ -24,8 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from rubhpc.running.beginning import RunRequest
-    from rubhpc.running.job import Job
+    from rubhpc.running.job import Job, RunRequest
     from rubhpc.running.pool import Pool
     from rubhpc.storage.journal import Entry
     from rubhpc.study.cases import Block

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 from rubhpc.errors import RubError
 from rubhpc.knock_cases import Progress, dataset_of, search_of
-from rubhpc.running.crash import crash
-from rubhpc.running.ending import ended_together
+from rubhpc.running.ending import crash, ended_together
 from rubhpc.running.pool import Totals, together
 from rubhpc.streams import lasting_streams
 from rubhpc.threads import on_one_thread

@@ -9,13 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.running.block_time import time_block
-from rubhpc.running.kept_setups import MOST_BYTES, MOST_SETUPS
-from rubhpc.running.memory import peak_memory
+from rubhpc.running.case_setup import MOST_BYTES, MOST_SETUPS, count_preparations, touched
 from rubhpc.running.plan_estimate import Cost, Estimate, percent
-from rubhpc.running.preparations import count_preparations, touched
-from rubhpc.running.refined_lines import expected_cases
-from rubhpc.running.timed_cases import CaseTimer
+from rubhpc.running.sampled_cases import CaseTimer, peak_memory, time_block
 from rubhpc.schema import DIVERGED, DONE, FAILED, INFERRED, MISSING, STATUS
 from rubhpc.storage.duration import duration, span
 from rubhpc.storage.growth import origins
@@ -33,16 +29,17 @@ from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
-    from rubhpc.running.preparations import Preparations
-    from rubhpc.running.timed_cases import Sample
+    from rubhpc.running.case_setup import Preparations
+    from rubhpc.running.sampled_cases import Sample
+    from rubhpc.storage.manifest import Manifest
+    from rubhpc.study.cases import CaseGrid
     from rubhpc.study.study import Study
 
 _LINE = 400  # bytes of a case in a journal, about, for one stator
 _OWN_COORDINATES = 9  # of the dimensions after the axes, the stators and the settings
 _SECONDS, _LEAST = 13.0, 4.0  # wall time of all, and of timing at least
-_FOR_CASES = 0.5  # of it in a refined map; the rest is for lines
+_OFF = 2.0  # factor by which the number of cases of a refined map is off, at most, as a rule (0.5 to 1.9)
 _FOR_HALF, _MANY, _LONG = 3.0, 4, 600.0  # s of it to time half of so many stators, if all takes so many s
 _AT_EDGES = 1.1  # seconds per step of cases that a refined map computes, over that of all cases, about
 _AGREED = 1.06  # most over least time, up to which no range is given
@@ -58,23 +55,19 @@ class Plan:
 
     Attributes
     ----------
+    grid : CaseGrid
+    manifest : Manifest
+        Of the store, as it is or will be.
     counts : tuple of int
         Cases that are missing, done, failed, diverged and inferred, in this order.
-    n_sequence, n_block, n_per_block : int
-        Sequences and blocks of the whole grid, and cases in a block.
-    n_file, n_file_running : int
-        Files of the finished store, and at most before its blocks are packed, about.
-    n_byte : int
-        Of the finished store before compression, about.
     steps : int
         Predicted integration steps of what is missing.
-    core_hours : float
-        For what is missing, from the timed cases; NaN where they failed.
-    least, most : float
-        Range of `core_hours`; `most` is infinite where a case was cut before its first revolution.
+    time, bound : Estimate
+        Time for what is missing, s, from the timed cases; NaN where they failed. Its most is infinite where a
+        case was cut before its first revolution. `bound` is for a refined map of which all is computed.
     start_up : float
-        Approximate processor seconds of the start and end of each process, which are not in `core_hours`; 0
-        where that is unknown.
+        Approximate processor seconds of the start and end of each process, which are not in `time`; 0 where
+        that is unknown.
     spent : float
         Processor seconds of the timing, without loading kernels, which a run needs too.
     memory : float
@@ -83,57 +76,51 @@ class Plan:
         The cases that were timed.
     mostly : str
         What takes most of the time, and what would help; "" where nothing does.
-    failures : tuple of str
-        Coordinates of the timed cases that failed, and why.
-    ranges : tuple of str
-        Range of each axis.
-    decay : str
-        Which free motion decays slowest, and how the transient compares.
-    warnings : tuple of str
-        Unstable speeds, a sag beyond the clearance, modes without damping.
-    n_expected : int or None
-        Cases that a refined map computes in all, about; `steps` and `core_hours` are for the rest of them.
-    most_core_hours : float
-        Those of a refined map if all its cases are computed; otherwise as `core_hours`.
     part : str
-        The part of the study to which counts, steps and core-hours refer, as "3/64"; "" for all of it.
+        The part of the study to which counts, steps and times refer, as "3/64"; "" for all of it.
+    n_expected : int or None
+        Cases that a refined map computes in all, about; `steps` and `time` are for the rest of them.
     """
 
-    title: str
-    store: Path
-    shape: dict[str, int]
+    grid: CaseGrid
+    manifest: Manifest
     counts: tuple[int, ...]
-    n_sequence: int
-    n_block: int
-    n_per_block: int
-    n_file: int
-    n_file_running: int
-    n_byte: int
     steps: int
-    core_hours: float
-    least: float
-    most: float
+    time: Estimate
+    bound: Estimate
     sample: Sample
     start_up: float = 0.0
     spent: float = 0.0
     memory: float = 0.0
     mostly: str = ""
-    failures: tuple[str, ...] = ()
-    ranges: tuple[str, ...] = ()
-    decay: str = ""
-    warnings: tuple[str, ...] = ()
     part: str = ""
     n_expected: int | None = None
-    most_core_hours: float = math.nan
 
     @property
-    def _files(self) -> str:
-        more = (
-            f", up to {self.n_file_running} before a run packs them"
-            if self.n_file_running > self.n_file
-            else ""
-        )
-        return f"{self.n_file} files{more}"
+    def core_hours(self) -> float:
+        """Time for what is missing."""
+        return self.time.seconds / 3600.0
+
+    @property
+    def _n_shard(self) -> int:
+        """Files of an array of the finished store if blocks are packed; 0 otherwise."""
+        manifest = self.manifest
+        pairs = zip(manifest.shape, manifest.shard, strict=False)
+        return math.prod(-(-n // s) for n, s in pairs) if manifest.shard else 0
+
+    @property
+    def n_file(self) -> int:
+        """Files of the finished store, about."""
+        manifest, n_block = self.manifest, len(self.grid.blocks())
+        # Metadata and values of each measure, of the status and of each coordinate; metadata of the arrays.
+        n_fixed = 2 * (len(manifest.measures) + 1 + len(manifest.axes) + _OWN_COORDINATES) + _PRIVATE_FILES
+        return (1 + (self._n_shard or n_block)) * len(manifest.variables) + n_fixed
+
+    @property
+    def n_file_running(self) -> int:
+        """Files at most before blocks are packed, about."""
+        n_block = len(self.grid.blocks()) if self._n_shard else 0
+        return self.n_file + n_block * len(self.manifest.variables)
 
     @property
     def _timed(self) -> list[str]:
@@ -158,65 +145,80 @@ class Plan:
     @property
     def _range(self) -> str:
         """Range of the time as text; "" where cases agree or nothing is known."""
-        if not self.most < math.inf or self.most <= _AGREED * self.least:
+        _, least, most = self.time
+        if not most < math.inf or most <= _AGREED * least:
             return ""
-        return span(3600.0 * self.least + self.start_up, 3600.0 * self.most + self.start_up)
+        return span(least + self.start_up, most + self.start_up)
 
     @property
-    def _whole(self) -> float:
-        """Seconds on one core, with the start of its process."""
-        return 3600.0 * self.core_hours + (self.start_up if self.counts[MISSING] else 0.0)
-
-    @property
-    def _idle(self) -> str:
-        if self.n_sequence == self.n_block:
-            return "more ranks would be idle"
-        sweeps = f"{self.n_sequence} sequential sweep{'s' * (self.n_sequence > 1)}"
-        return f"in {sweeps}: more ranks than that would be idle"
-
-    def text(self) -> str:
-        """The plan as a few lines of text."""
-        n_case = math.prod(self.shape.values())
-        sizes = " x ".join(f"{n} {name}" for name, n in self.shape.items())
+    def _cost(self) -> str:
+        """Core-hours with the start of a process."""
+        whole = self.time.seconds + (self.start_up if self.counts[MISSING] else 0.0)
         cost = (
-            f"{'at least ' * math.isinf(self.most)}{self._whole / 3600:.3g} core-hours "
-            f"({self._range or duration(self._whole)} on one core)"
-            if math.isfinite(self.core_hours)
+            f"{'at least ' * math.isinf(self.time.most)}{whole / 3600:.3g} core-hours "
+            f"({self._range or duration(whole)} on one core)"
+            if math.isfinite(whole)
             else "core-hours unknown: "
             + ("the timed cases failed" if self.sample.failures else "no case could begin in time")
         )
         if self.start_up > 0.0 and self.counts[MISSING]:
             cost += f", including {self.start_up:.1f} s to start a process"
+        return cost
+
+    @property
+    def _sizes(self) -> str:
+        """The dimensions, as the study names its axes."""
+        study = self.grid.study
+        names = {axis.coordinate: axis.name for axis in study.axes}
+        if study.sample is not None:
+            n_range = sum(axis.drawn_from is not None for axis in study.axes)
+            names[CASE] = f"{CASE} ({study.sample.n} points of {n_range} range{'s' * (n_range > 1)})"
+        pairs = zip(self.grid.dims, self.grid.shape, strict=True)
+        return " x ".join(f"{n} {names.get(dim, dim)}" for dim, n in pairs)
+
+    def text(self) -> str:
+        """The plan as a few lines of text."""
+        grid, manifest, n_case = self.grid, self.manifest, self.grid.n_case
+        n_block, n_sequence = len(grid.blocks()), len(grid.sequences())
+        sweeps = (
+            f"in {n_sequence} sequential sweep{'s' * (n_sequence > 1)}: more ranks than that would be idle"
+        )
+        idle = "more ranks would be idle" if n_sequence == n_block else sweeps
+        per_case = sum(math.prod(manifest.extent(v)) * np.dtype(v.dtype).itemsize for v in manifest.variables)
+        is_packed = self.n_file_running > self.n_file
+        files = f"{self.n_file} files" + f", up to {self.n_file_running} before a run packs them" * is_packed
         compiled = "; includes compilation, less from now on" if self.sample.has_compiled else ""
+        refined = (
+            f"refined     computes at most all {n_case} cases, about {self.n_expected}"
+            f"; at most {self.bound.seconds / 3600:.3g} core-hours"
+        )
+        so_far = ", ".join(
+            f"{self.counts[i]} {STATUS[i]}"
+            for i in (DONE, FAILED, DIVERGED, INFERRED, MISSING)
+            if i != INFERRED or self.counts[i]
+        )
+        decay = grid.decay()
         return "\n".join(
             [
-                f"{self.title} -> {self.store}",
-                f"cases       {n_case} = {sizes}",
-                *(f"            {text}" for text in self.ranges),
-                f"blocks      {self.n_block}, at most {self.n_per_block} cases each; {self._idle}",
-                f"store       {_size(self.n_byte)} before compression, {self._files}",
+                f"{grid.study.title} -> {grid.study.output}",
+                f"cases       {n_case} = {self._sizes}",
+                *(f"            {text}" for text in axis_ranges(grid)),
+                f"blocks      {n_block}, at most {math.prod(grid.chunk)} cases each; {idle}",
+                f"store       {_size(n_case * (per_case + 2 * _LINE))} before compression, {files}",
                 *([f"memory      {_size(self.memory)} a process, about{compiled}"] if self.memory else []),
-                *(
-                    [
-                        f"refined     computes at most all {n_case} cases, about {self.n_expected}"
-                        f"; at most {self.most_core_hours:.3g} core-hours"
-                    ]
-                    if self.n_expected is not None
-                    else []
-                ),
+                *([refined] if self.n_expected is not None else []),
                 *([f"part        {self.part}: {sum(self.counts)} cases"] if self.part else []),
-                "so far      "
-                + ", ".join(
-                    f"{self.counts[i]} {STATUS[i]}"
-                    for i in (DONE, FAILED, DIVERGED, INFERRED, MISSING)
-                    if i != INFERRED or self.counts[i]
-                ),
-                f"to compute  {self.steps:.3g} steps, {cost}",
+                f"so far      {so_far}",
+                f"to compute  {self.steps:.3g} steps, {self._cost}",
                 *self._timed,
                 *([f"mostly      {self.mostly}"] if self.mostly else []),
-                *(f"failed      a timed case: {text}" for text in self.failures),
-                *([f"decay       {self.decay}"] if self.decay else []),
-                *(f"warning     {text}" for text in self.warnings),
+                *(
+                    f"failed      a timed case: "
+                    f"{manifest.name_case(int(np.ravel_multi_index(index, grid.shape)))}: {text}"
+                    for index, text in self.sample.failures
+                ),
+                *([f"decay       {decay}"] if decay else []),
+                *(f"warning     {text}" for text in grid.warnings()),
             ]
         )
 
@@ -240,10 +242,8 @@ def make_plan(study: Study, part: str | None = None, say: Callable[[str], None] 
         check_parts(chosen, study)
     grid = grid_for(study)
     manifest = manifest_of(grid)
-    blocks = grid.blocks()
-    shares = None
-    status = np.zeros(grid.n_case, np.int8)
     kind = manifest.header.record_type
+    status, shares = np.zeros(grid.n_case, np.int8), None
     records = blank_records(grid.n_case if manifest.refine else 0, kind)
     if is_store(study.output):
         store = Store(study.output)
@@ -263,41 +263,40 @@ def make_plan(study: Study, part: str | None = None, say: Callable[[str], None] 
             shares = Shares(chosen.total, share_out(grid, chosen.total))
         is_in_part = shares.cases(chosen.number, manifest)
     missing = (is_in_part & (status == MISSING)).reshape(grid.shape)
+    blocks = grid.blocks()
     left = [(block, share) for block in blocks if (share := missing_share(block, missing))]
-    all_steps = sum(block.cost * share for block, share in left)
-    ranges, warnings = axis_ranges(grid), grid.warnings()
-    began_timing = time.process_time()
-    end = max(began + _SECONDS, time.monotonic() + _LEAST)
-    for_cases = end if refinement is None else time.monotonic() + _FOR_CASES * (end - time.monotonic())
-    n_missing = int(missing.sum())
+    steps = sum(block.cost * share for block, share in left)
     steps_of = {block.start: block.cost / math.prod(block.shape) for block in blocks}
 
     def steps_at(index: tuple[int, ...]) -> float:
         return steps_of[tuple(i - i % n for i, n in zip(index, grid.chunk, strict=True))]
 
-    timer = CaseTimer(grid, for_cases - (_FOR_HALF if len(study.rig.stator) >= _MANY else 0.0))
+    began_timing = time.process_time()
+    end = max(began + _SECONDS, time.monotonic() + _LEAST)
+    n_stator = len(study.rig.stator)
+    timer = CaseTimer(grid, end - (_FOR_HALF if n_stator >= _MANY else 0.0))
     sample = timer.time_cases(missing, steps_at, say) if left else timer.sample
-    steps, n_expected, share, off = all_steps, None, 1.0, 0.0
+    share, n_expected, off = 1.0, None, 1.0
     if refinement is not None:
-        expected = expected_cases(refinement, grid, kind, end - time.monotonic() if sample.cases else 0.0)
-        n_expected = round(expected.n_case)
-        n_left = max(expected.n_case - float((refinement.asked().cases.ravel() & known).sum()), 0.0)
+        asked = refinement.asked()
+        n_expected = asked.n_expected
+        n_left = max(n_expected - int((asked.cases.ravel() & known).sum()), 0)
         share = min(n_left / max(int((~known).sum()), 1), 1.0)
-        steps = share * all_steps
-        off = expected.error / max(expected.n_case, 1.0)
-    found, bound, mostly, memory = Estimate(0.0, 0.0, 0.0), 0.0, "", 0.0
+        off = _OFF if asked.edges is None else 1.0
+    found = bound = Estimate(0.0, 0.0, 0.0)
+    mostly, memory = "", 0.0
     if left:
+        n_missing = int(missing.sum())
         cost = Cost(
             cases=sample.cases,
             n_case=n_missing,
-            steps=all_steps,
+            steps=steps,
             prepared=count_preparations(grid, missing),
             n_block=len(left),
-            block=time_block(manifest, sample.arrays) if sample.arrays else 0.0,
+            block=0.0 if sample.record is None else time_block(manifest, sample.record),
         )
-        found = cost.estimate()
-        bound, mostly = found.seconds, cost.mostly(study)
-        n_stator = len(study.rig.stator)
+        found = bound = cost.estimate()
+        mostly = cost.mostly(study)
         if n_stator >= _MANY and found.seconds > _LONG and not study.rig.carrier:
             half = timer.time_half(_FOR_HALF)
             advice = f"with half of the {n_stator} stators a case took {half:.2g} of the time"
@@ -306,53 +305,26 @@ def make_plan(study: Study, part: str | None = None, say: Callable[[str], None] 
             some = replace(
                 cost,
                 n_case=max(round(share * n_missing), 1),
-                steps=_AT_EDGES * steps,
+                steps=_AT_EDGES * share * steps,
                 prepared=cost.prepared.for_some(share, n_missing),
                 n_block=touched(len(left), share, n_missing),
             )
-            found = some.estimate().scaled(1.0, off)
-            found = found._replace(seconds=min(found.seconds, bound))
-        memory = (
-            _memory(sample, None if study.changes_speed else cost.prepared)
-            + _LEDGERS * grid.n_case * kind.itemsize
-        )
-    per_case = sum(math.prod(manifest.extent(v)) * np.dtype(v.dtype).itemsize for v in manifest.variables)
-    shards = zip(manifest.shape, manifest.shard, strict=False)
-    n_shard = math.prod(-(-n // s) for n, s in shards) if manifest.shard else 0
-    # Metadata and values of each measure, of the status and of each coordinate; metadata of the arrays.
-    n_fixed = 2 * (len(manifest.measures) + 1 + len(manifest.axes) + _OWN_COORDINATES)
-    n_fixed += len(manifest.variables) + _PRIVATE_FILES
-    names = {axis.coordinate: axis.name for axis in study.axes}  # a dimension as the study names its axis
-    if study.sample is not None:
-        n_range = sum(axis.drawn_from is not None for axis in study.axes)
-        names[CASE] = f"{CASE} ({study.sample.n} points of {n_range} range{'s' * (n_range > 1)})"
+            seconds, least, most = some.estimate()
+            found = Estimate(min(seconds, bound.seconds), least / off, most * off)
+        if sample.cases:
+            memory = _memory(sample, None if study.changes_speed else cost.prepared)
+            memory += _LEDGERS * grid.n_case * kind.itemsize
     return Plan(
-        title=study.title,
-        store=study.output,
-        shape=dict(zip((names.get(dim, dim) for dim in grid.dims), grid.shape, strict=True)),
+        grid=grid,
+        manifest=manifest,
         counts=count(status[is_in_part]),
-        n_sequence=len(grid.sequences()),
-        n_block=len(blocks),
-        n_per_block=math.prod(grid.chunk),
-        n_file=(n_shard or len(blocks)) * len(manifest.variables) + n_fixed,
-        n_file_running=(n_shard + len(blocks)) * len(manifest.variables) + n_fixed,
-        n_byte=grid.n_case * (per_case + 2 * _LINE),
-        steps=round(steps),
-        core_hours=found.seconds / 3600,
-        least=found.least / 3600,
-        most=found.most / 3600,
-        most_core_hours=bound / 3600,
+        steps=round(share * steps),
+        time=found,
+        bound=bound,
         sample=sample,
         spent=time.process_time() - began_timing - sample.loading,
         mostly=mostly,
-        failures=tuple(
-            f"{manifest.name_case(int(np.ravel_multi_index(index, grid.shape)))}: {text}"
-            for index, text in sample.failures
-        ),
-        memory=memory if sample.cases else 0.0,
-        ranges=ranges,
-        decay=grid.decay(),
-        warnings=warnings,
+        memory=memory,
         part="" if chosen is None else str(chosen),
         n_expected=n_expected,
     )

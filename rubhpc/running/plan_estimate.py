@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    from rubhpc.running.preparations import Preparations
-    from rubhpc.running.trail import Timed
+    from rubhpc.running.case_setup import Preparations
     from rubhpc.study.study import Study
 
 _WITHIN = 0.95  # by Student's distribution; in fact 0.8 to 0.95, as few cases rarely include the longest
@@ -22,23 +21,60 @@ _LONGEST = math.log(6.0)  # reach, at most
 _MAIN = 0.4  # share of the time from which a part of it is named
 
 
+@dataclass(frozen=True, kw_only=True)
+class Timed:
+    """Processor times of a case, s.
+
+    Attributes
+    ----------
+    steps : float
+        Predicted.
+    spent : float
+        As far as it was run, without `speed` and `shared`.
+    is_whole : bool
+        Whether it was run to its end.
+    share : float
+        Share of its revolutions that was run; 0 where that is not known.
+    rest, least, most : float
+        Predicted time of the rest, and a range of it.
+    speed : float
+        Of its set-up.
+    shared : float
+        Of contact modes that other cases of its speed and friction need not solve again.
+    transient, modes : float
+        Share of its time before the record, and for contact modes.
+    n_mode : int
+        Contact modes that were solved; 0 with one stator.
+    n_byte : float
+        Predicted memory of all its contact modes.
+    """
+
+    steps: float
+    spent: float
+    is_whole: bool
+    share: float = 1.0
+    rest: float = 0.0
+    least: float = 0.0
+    most: float = 0.0
+    speed: float = 0.0
+    shared: float = 0.0
+    transient: float = 0.0
+    modes: float = 0.0
+    n_mode: int = 0
+    n_byte: float = 0.0
+
+    @property
+    def whole(self) -> float:
+        """Time from its beginning to its end."""
+        return self.spent + self.rest
+
+
 class Estimate(NamedTuple):
     """A time, s, and its range."""
 
     seconds: float
     least: float
     most: float
-
-    def scaled(self, factor: float, off: float = 0.0) -> Estimate:
-        """Times a factor with a relative standard error `off`."""
-        low, high = (
-            math.hypot(math.log(r), 2.0 * off) if 0.0 < r < math.inf else 0.0
-            for r in (self.seconds / max(self.least, 1e-9), self.most / max(self.seconds, 1e-9))
-        )
-        seconds = factor * self.seconds
-        return Estimate(
-            seconds, seconds * math.exp(-low), seconds * math.exp(high) if self.most < math.inf else math.inf
-        )
 
 
 def estimate(cases: list[Timed], n_case: int, steps: float) -> Estimate:
@@ -52,24 +88,19 @@ def estimate(cases: list[Timed], n_case: int, steps: float) -> Estimate:
         return Estimate(math.nan, math.nan, math.nan)
     known = sum(case.spent for case in cases)
     cases = [case for case in cases if case.most < math.inf] or cases
-    timed = np.array(
-        [[case.spent + case.least, case.spent + case.rest, case.spent + case.most] for case in cases]
-    )
+    timed = np.array([[case.spent + case.least, case.whole, case.spent + case.most] for case in cases])
     share = sum(case.steps for case in cases) / steps if len(cases) < n_case else 1.0
     least, seconds, most = (timed.sum(axis=0) / min(share, 1.0)).tolist()
-    down = up = 0.0
-    if len(cases) < n_case:
-        reach = _reach(cases, n_case)
-        down, up = min(reach, _LONGEST), min(_UPWARD * reach, _LONGEST)
-    low, high = (
-        math.hypot(r, math.log(b)) if b < math.inf else b
-        for r, b in ((down, seconds / least), (up, most / seconds))
-    )
+    reach = _reach(cases, n_case)
+    low = math.hypot(min(reach, _LONGEST), math.log(seconds / least))
+    high = math.hypot(min(_UPWARD * reach, _LONGEST), math.log(most / seconds))
     return Estimate(seconds, max(seconds * math.exp(-low), min(known, seconds)), seconds * math.exp(high))
 
 
 def _reach(cases: list[Timed], n_case: int) -> float:
     """Reach of a range downwards, as a factor's logarithm."""
+    if len(cases) >= n_case:
+        return 0.0
     if len(cases) == 1:
         return _ALONE
     from scipy.special import stdtrit
@@ -85,7 +116,7 @@ def relative_error(cases: list[Timed], n_case: int) -> float:
         return 0.0
     if n < 2:
         return math.inf
-    steps, seconds = np.array([(case.steps, case.spent + case.rest) for case in cases]).T
+    steps, seconds = np.array([(case.steps, case.whole) for case in cases]).T
     residual = seconds - seconds.sum() / steps.sum() * steps
     return math.sqrt((1.0 - n / n_case) * n / (n - 1) * float(residual @ residual)) / float(seconds.sum())
 
@@ -117,8 +148,8 @@ class Cost:
 
     def estimate(self) -> Estimate:
         """Time of all cases."""
-        found, once = estimate(self.cases, self.n_case, self.steps), sum(self._once)
-        return Estimate(*(seconds + once for seconds in found))
+        once = sum(self._once)
+        return Estimate(*(seconds + once for seconds in estimate(self.cases, self.n_case, self.steps)))
 
     @property
     def _once(self) -> tuple[float, float, float]:
@@ -133,11 +164,10 @@ class Cost:
         """What takes most of the time, and what would help; "" where nothing stands out."""
         set_ups, shared, writing = self._once
         whole = self.estimate().seconds
-        seconds = sum(case.spent + case.rest for case in self.cases)
+        seconds = np.array([case.whole for case in self.cases])
+        shares = np.array([(case.modes, case.transient) for case in self.cases])
         modes, transient = (
-            sum((case.spent + case.rest) * share for case, share in zip(self.cases, shares, strict=True))
-            / max(seconds, 1e-9)
-            for shares in ([case.modes for case in self.cases], [case.transient for case in self.cases])
+            (seconds @ shares / max(float(seconds.sum()), 1e-9)).tolist() if shares.size else (0.0, 0.0)
         )
         of_cases = 1.0 - (set_ups + shared + writing) / whole
         recording, n = study.recording, len(study.rig.stator)

@@ -11,7 +11,7 @@ import sys
 import time
 import warnings
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, Protocol, TypeVar, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, TypeVar, cast
 
 import numpy as np
 
@@ -52,27 +52,37 @@ class RankLost(RubError):  # noqa: N818 - it is news, and most runs go on
     exit_code = 71
 
 
-class Pool(Protocol):
-    """The processes that share a run."""
+class Pool:
+    """The processes that share a run: this one alone. Ranks and workers override what they share."""
 
-    rank: int
-    size: int
-    is_launched: bool  # by mpirun or the like, which stands between the ranks and the terminal
+    rank: int = 0
+    size: int = 1
+    is_launched: bool = False  # by mpirun or the like, which stands between the ranks and the terminal
+
+    def __init__(self) -> None:
+        self._own = np.zeros(len(Totals()), np.int64)
 
     def from_first(self, make: Callable[[], T]) -> T:
         """What `make` returns on the first rank, on all ranks; a RubError it raises is raised on all."""
+        return make()
 
     def claim(self) -> Totals:
         """Claim the next block, whose position is `claimed` in the sums as they were before."""
+        return self.add(Totals(claimed=1))
 
     def add(self, increment: Totals) -> Totals:
         """Add to the sums; returns them as they were before."""
+        before = Totals(*self._own.tolist())
+        self._own += increment
+        return before
 
     def totals(self) -> Totals:
         """The current sums; cheap on the first rank, which holds them."""
+        return self.add(Totals())
 
     def gather(self, value: T) -> list[T]:
         """The values of all ranks, on all of them."""
+        return [value]
 
     def leave_lost(self) -> None:
         """Continue without the lost ranks; ranks, size and sums are reset."""
@@ -87,54 +97,7 @@ class Pool(Protocol):
         """End the other processes of the run now, or report a text and end this one where that ends them."""
 
 
-class Alone:
-    """One process."""
-
-    rank = 0
-    size = 1
-    is_launched = False
-
-    def __init__(self) -> None:
-        self._sums = np.zeros(len(Totals()), np.int64)
-
-    def from_first(self, make: Callable[[], T]) -> T:
-        """See Pool."""
-        return make()
-
-    def claim(self) -> Totals:
-        """See Pool."""
-        before = self.totals()
-        self._sums[0] += 1
-        return before
-
-    def add(self, increment: Totals) -> Totals:
-        """See Pool."""
-        before = self.totals()
-        self._sums += increment
-        return before
-
-    def totals(self) -> Totals:
-        """See Pool."""
-        return Totals(*self._sums.tolist())
-
-    def gather(self, value: T) -> list[T]:
-        """See Pool."""
-        return [value]
-
-    def leave_lost(self) -> None:
-        """See Pool."""
-
-    def close(self) -> None:
-        """See Pool."""
-
-    def stop(self) -> None:
-        """See Pool."""
-
-    def abort(self, code: int, text: str = "") -> None:
-        """See Pool."""
-
-
-class Ranks:
+class Ranks(Pool):
     """The ranks of an MPI communicator, with the sums in a window of the first.
 
     Where the library survives the loss of a rank (Open MPI under `mpirun --with-ft ulfm`), the others learn
@@ -178,18 +141,6 @@ class Ranks:
         made: T = value
         return made
 
-    def claim(self) -> Totals:
-        """See Pool."""
-        return self._accumulate(Totals(claimed=1))
-
-    def add(self, increment: Totals) -> Totals:
-        """See Pool."""
-        return self._accumulate(increment)
-
-    def totals(self) -> Totals:
-        """See Pool."""
-        return self._accumulate(Totals())
-
     def gather(self, value: T) -> list[T]:
         """See Pool."""
         self._meet()
@@ -211,9 +162,6 @@ class Ranks:
             self._window.Unlock_all()
             self._window.Free()
 
-    def stop(self) -> None:
-        """See Pool."""
-
     def abort(self, code: int, text: str = "") -> NoReturn:
         """See Pool."""
         last_words(text)
@@ -228,7 +176,7 @@ class Ranks:
             while not request.Test():
                 time.sleep(_NAP)
 
-    def _accumulate(self, increment: Totals) -> Totals:
+    def add(self, increment: Totals) -> Totals:
         """Add to the sums and return what they were, in one atomic message."""
         added = np.array(increment, np.int64)
         before = np.zeros_like(added)
@@ -292,7 +240,7 @@ def connect() -> Pool:
     given = launch()
     end_with_launcher()
     if given.size == 1:
-        return Alone()
+        return Pool()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # of a foreign launcher, which is refused here
         library, n_connected = _connected(given)

@@ -9,10 +9,9 @@ import numpy as np
 
 from rubhpc.errors import InputError, RubError, StoreError
 from rubhpc.integrate.record import Record, State
-from rubhpc.running.case_rows import packed_measures, put_any
 from rubhpc.running.case_setup import set_up
 from rubhpc.running.initial_states import is_intact
-from rubhpc.running.worker import integrate
+from rubhpc.running.worker import integrate, packed_measures, put_any
 from rubhpc.schema import DONE, FINAL_STATE, MISSING, STATUS
 from rubhpc.storage.measures import blank_records
 from rubhpc.storage.new_manifest import manifest_of

@@ -13,7 +13,7 @@ def main(parent: int) -> None:
     """Compute the case that the parent has written; an error of it is found again, and reported, there."""
     end_with(parent)
     study, case, state = pickle.load(sys.stdin.buffer)  # noqa: S301 - from the parent
-    from rubhpc.running.kept_setups import KeptSetups
+    from rubhpc.running.case_setup import KeptSetups
     from rubhpc.running.worker import record_of
     from rubhpc.study.cases import CaseGrid
 

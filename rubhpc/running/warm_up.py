@@ -10,8 +10,7 @@ import numpy as np
 
 from rubhpc.integrate.case import compile_kernels, kernel_sets
 from rubhpc.integrate.compilation import expect_sets
-from rubhpc.running.case_setup import case_for_kernels, set_up_for_kernels
-from rubhpc.running.kept_setups import KeptSetups
+from rubhpc.running.case_setup import KeptSetups, case_for_kernels, set_up_for_kernels
 from rubhpc.running.worker import record_of
 from rubhpc.study.speed_law import SpeedLaw
 

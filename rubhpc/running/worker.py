@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import sys
+import threading
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -13,28 +16,28 @@ from rubhpc.integrate.case import run_case
 from rubhpc.integrate.changing_speed.case import RunUpRecord, record_run_up
 from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.integrate.record import State
-from rubhpc.running.case_rows import packed_measures, put_any
-from rubhpc.running.case_setup import operation_of
+from rubhpc.running.case_setup import KeptSetups, operation_of
 from rubhpc.running.held_blocks import HeldBlocks
 from rubhpc.running.initial_states import InitialState, InitialStates
-from rubhpc.running.kept_setups import KeptSetups
+from rubhpc.running.launch import launch
 from rubhpc.running.pool import Totals
 from rubhpc.running.stopping import Stopped
 from rubhpc.running.trial import CaseDied, try_apart
-from rubhpc.running.watchdog import PATIENCE
-from rubhpc.schema import DIVERGED, DONE, FAILED
+from rubhpc.schema import DIVERGED, DONE, FAILED, FINAL_STATE
 from rubhpc.storage.journal import Entry
+from rubhpc.storage.measures import missing_value
 from rubhpc.storage.store import case_checksum
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from types import TracebackType
 
     from numpy.typing import NDArray
 
     from rubhpc.integrate.record import Record
     from rubhpc.integrate.setup import Setup
     from rubhpc.running.stopping import Stopping
-    from rubhpc.running.watchdog import Watchdog
+    from rubhpc.storage.in_progress import InProgress
     from rubhpc.storage.journal import Journal
     from rubhpc.storage.ledger import Ledger
     from rubhpc.storage.store import Store
@@ -43,6 +46,101 @@ if TYPE_CHECKING:
     from rubhpc.study.study import Study
 
     Arrays = dict[str, NDArray[Any]]
+
+
+def put_any(record: Record | BranchRecord | RunUpRecord, data: Arrays, i_case: int) -> None:
+    """Put the arrays of a record into those of a block."""
+    if isinstance(record, BranchRecord | RunUpRecord):
+        put_points(record, data, i_case)
+    else:
+        put(record, data, i_case)
+
+
+def put(record: Record, data: Arrays, i_case: int) -> None:
+    """Put the arrays of a record that is done into those of a block.
+
+    Raises
+    ------
+    FloatingPointError
+        One of them is not finite.
+    """
+    if record.status != DONE:
+        return
+    arrays = {**record.signals, **record.spectra, **record.sections}
+    if FINAL_STATE in data:
+        arrays[FINAL_STATE] = record.final.packed()
+    for name, values in data.items():
+        if not np.isfinite(arrays[name]).all():
+            raise FloatingPointError(f"{name} is not finite")
+        values[i_case] = arrays[name]
+
+
+def put_points(record: BranchRecord | RunUpRecord, data: Arrays, i_case: int) -> None:
+    """Put the points of branches, or the revolutions and samples of a run-up, into the arrays of a block."""
+    for name, values in data.items():
+        values[i_case] = np.nan
+        found = record.arrays.get(name, np.zeros(0))
+        if found.size:  # a case without a point has no shape either
+            values[i_case][tuple(slice(n) for n in found.shape)] = found
+
+
+def packed_measures(record: Record | BranchRecord | RunUpRecord, kind: np.dtype[np.void]) -> NDArray[np.void]:
+    """The measures of a record, packed; one that this version does not know is missing."""
+    row = np.zeros((), kind)
+    for name in kind.names or ():
+        row[name] = record.measures[name] if name in record.measures else missing_value(kind[name])
+    return row
+
+
+PATIENCE = 10.0  # s over its limit until a case checks its limit: a kernel call lasts 0.25 s
+_LOOK = 0.5  # s between looks
+_STOPPED = 75  # exit code: run the same command again
+
+
+class Watchdog:
+    """Watches the cases of a rank, as a context; without a limit (s) it watches nothing.
+
+    A kernel that does not return cannot be interrupted. The rank therefore records its case as overrun and
+    exits, and the launcher ends the other ranks; the next run marks the case as failed and continues.
+    """
+
+    def __init__(self, limit: float | None, record: InProgress) -> None:
+        self.limit, self._record = limit, record
+        self._deadline = float("inf")
+        self._ended = threading.Event()
+
+    def begin(self, flat: int, name: str) -> None:
+        """A case begins."""
+        self._record.take(flat, name)
+        if self.limit is not None:
+            self._deadline = time.monotonic() + self.limit + PATIENCE
+
+    def end(self) -> None:
+        """The case has ended."""
+        self._deadline = float("inf")
+
+    def __enter__(self) -> Self:
+        if self.limit is not None:
+            threading.Thread(target=self._look, args=(self.limit,), name="case watch", daemon=True).start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._ended.set()
+
+    def _look(self, limit: float) -> None:
+        while time.monotonic() < self._deadline:
+            if self._ended.wait(_LOOK):
+                return
+        self._record.note_overrun(limit)
+        print(
+            f"rubhpc: rank {launch().rank}: a case is over its time limit of {limit:g} s and cannot be "
+            "interrupted; run the same command again, which skips this case",
+            file=sys.stderr,
+            flush=True,
+        )
+        os._exit(_STOPPED)
 
 
 class _OverTime(Exception):  # noqa: N818 - becomes the reason of a failed case

@@ -24,13 +24,12 @@ import numpy as np
 from rubhpc.children import command, environment
 from rubhpc.errors import InputError, RubError
 from rubhpc.running.launch import launch, move_to
-from rubhpc.running.pool import RankLost, Totals, last_words
+from rubhpc.running.pool import Pool, RankLost, Totals, last_words
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from types import TracebackType
 
-    from rubhpc.running.pool import Pool
     from rubhpc.running.stopping import Stopping
 
     Part = Callable[[Pool, Stopping], object]
@@ -67,25 +66,15 @@ class Sums:
         np.frombuffer(self._memory, np.int64)[:] = 0
 
 
-class _Shared:
-    """What parent and workers have in common; see `pool.Pool`."""
-
-    is_launched = False
+class _Shared(Pool):
+    """What parent and workers have in common."""
 
     def __init__(self, rank: int, size: int, sums: Sums) -> None:
         self.rank, self.size, self._sums = rank, size, sums
 
-    def claim(self) -> Totals:
-        """See Pool."""
-        return self._sums.add(Totals(claimed=1))
-
     def add(self, increment: Totals) -> Totals:
         """See Pool."""
         return self._sums.add(increment)
-
-    def totals(self) -> Totals:
-        """See Pool."""
-        return self._sums.add(Totals())
 
 
 class Parent(_Shared):
@@ -164,9 +153,6 @@ class Parent(_Shared):
             with suppress(ProcessLookupError):
                 process.send_signal(signal.SIGTERM)
 
-    def close(self) -> None:
-        """See Pool."""
-
     def abort(self, code: int, text: str = "") -> None:
         """See Pool."""
         for process, _ in self._workers:
@@ -210,12 +196,6 @@ class Child(_Shared):
         """What to do, as the parent has sent it first."""
         found: Part = self._receive()
         return found
-
-    def stop(self) -> None:
-        """Nothing: the parent stops the others."""
-
-    def close(self) -> None:
-        """See Pool."""
 
     def abort(self, code: int, text: str = "") -> None:
         """See Pool: this one ends, and the others continue without it."""

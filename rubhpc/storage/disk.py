@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import shutil
 import stat
 import uuid
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rubhpc.errors import StoreError, lacks_inodes, reason_of
 
@@ -156,3 +158,31 @@ def flush_to_disk(path: Path) -> None:
         os.fsync(handle)
     finally:
         os.close(handle)
+
+
+T = TypeVar("T")
+
+_MOST = 2**16  # bytes
+_NUMBERS: dict[str, tuple[type, ...]] = {"int": (int,), "float": (int, float)}
+
+
+def read_record(path: Path, kind: type[T]) -> T | None:
+    """The record of a dataclass of texts and numbers at `path`; None where it is absent or damaged."""
+    try:
+        content = json.loads(read_regular(path, _MOST))
+        if not isinstance(content, dict):
+            return None
+        record: T = kind(**content)
+    except (OSError, ValueError, TypeError, RecursionError):
+        return None
+    types: dict[str, Any] = {f.name: f.type for f in fields(record)}  # type: ignore[arg-type]
+    return record if all(_is_sound(getattr(record, n), t) for n, t in types.items()) else None
+
+
+def _is_sound(value: object, kind: str) -> bool:
+    """Whether a value is of its type, a text printable and a number not beyond any clock or count."""
+    if isinstance(value, str):
+        return kind == "str" and value.isprintable()
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return kind in _NUMBERS and isinstance(value, _NUMBERS[kind]) and abs(value) < 2**63

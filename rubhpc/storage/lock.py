@@ -10,6 +10,7 @@ from __future__ import annotations
 import fcntl
 import json
 import os
+import shutil
 import socket
 import threading
 import time
@@ -22,8 +23,7 @@ from typing import TYPE_CHECKING, Self
 from zlib import crc32
 
 from rubhpc.errors import StoreError
-from rubhpc.storage.disk import remove
-from rubhpc.storage.small_file import read_record
+from rubhpc.storage.disk import read_record, remove
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -287,3 +287,24 @@ def _guard(path: Path) -> Iterator[None]:
         with suppress(OSError):  # no flock on this file system
             fcntl.flock(file, fcntl.LOCK_EX)
         yield
+
+
+def draft_of(path: Path) -> Path:
+    """Where this process builds the store at a path, which has no link in it."""
+    return path.with_name(f".{path.name}.{socket.gethostname()}.{process_space()}.{os.getpid()}.draft")
+
+
+def remove_drafts(path: Path, *, is_made: bool = False) -> None:
+    """Remove drafts of this store that killed processes left that would be seen; once it is made, all.
+
+    A process that still writes one of those finds the store when it cannot rename its draft.
+    """
+    path = Path(os.path.realpath(path))
+    prefix, host = f".{path.name}.", socket.gethostname()
+    for name in os.listdir(path.parent):  # no pattern: a store's name may hold anything
+        if name.startswith(f"{prefix}{host}.") and name.endswith(".draft"):
+            space, _, pid = name[len(f"{prefix}{host}.") : -len(".draft")].rpartition(".")
+            is_near = space in ("", process_space())
+            state = process_state(int(pid)) if pid.isdigit() else None
+            if pid.isdigit() and (is_made or (is_near and (state is None or state[0] in "ZX"))):
+                shutil.rmtree(path.parent / name, ignore_errors=True)

@@ -60,11 +60,6 @@ class Refinement:
         self._fresh: list[NDArray[np.int64]] = []  # cases entered since edges were followed
 
     @property
-    def levels(self) -> Levels:
-        """Levels of the grid, or of the box."""
-        return self._levels
-
-    @property
     def refined(self) -> tuple[int, ...]:
         """Dimensions of the grid that are refined."""
         return self._levels.refined
@@ -124,15 +119,6 @@ class Refinement:
             self._edges.follow(self._results(), fresh[self._is_known[fresh] & asked.ravel()[fresh]])
         missing: NDArray[np.bool_] = asked.ravel() & ~self._is_known
         return missing
-
-    def missing_cases(self) -> NDArray[np.int64]:
-        """Numbers of those in the grid."""
-        missing = np.flatnonzero(self.missing())
-        return missing if self._flat is None else self._flat[missing]
-
-    def count_ends(self) -> int:
-        """Count the cases of the first level that the first halving asks for (`Levels.count_ends`)."""
-        return self._levels.count_ends(self._results())
 
     def _results(self) -> Results:
         shape = self._levels.shape

@@ -9,10 +9,9 @@ import time
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from rubhpc.storage.disk import write_whole
+from rubhpc.storage.disk import read_record, write_whole
 from rubhpc.storage.journal import journals, next_run
 from rubhpc.storage.manifest import PRIVATE
-from rubhpc.storage.small_file import read_record
 from rubhpc.version import __version__
 
 

@@ -17,7 +17,7 @@ from rubhpc.storage.lock import is_alive, read_holder
 from rubhpc.storage.manifest import PRIVATE, Manifest
 from rubhpc.storage.parts import Parts
 from rubhpc.storage.refined import status_of
-from rubhpc.storage.verdicts import verdicts
+from rubhpc.storage.summary import verdicts
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -23,10 +23,9 @@ from rubhpc.schema import DIVERGED, DONE, MISSING
 from rubhpc.storage import layout
 from rubhpc.storage.block_files import BlockFiles
 from rubhpc.storage.disk import disk_errors, read_regular, write_whole
-from rubhpc.storage.drafts import draft_of, remove_drafts
 from rubhpc.storage.journal import Entry, Journal
 from rubhpc.storage.ledger import Ledger, replay
-from rubhpc.storage.lock import Lock
+from rubhpc.storage.lock import Lock, draft_of, remove_drafts
 from rubhpc.storage.manifest import GROWTH, PRIVATE, Manifest, no_store
 from rubhpc.storage.packed import PackingNote, state_of_journals, write_packed
 from rubhpc.storage.parts import Parts

@@ -7,10 +7,10 @@ from dataclasses import Field, replace
 from typing import TYPE_CHECKING, Any
 
 from rubhpc.errors import InputError
-from rubhpc.input.dotted import find_key
 from rubhpc.input.fields import check_value, parse_field
 from rubhpc.input.messages import brief, nearest, place
-from rubhpc.input.ranges import MOST_VALUES, RANGE_KEYS, read_ends, read_range
+from rubhpc.input.quantity import MOST_VALUES, RANGE_KEYS, read_ends, read_range
+from rubhpc.input.reading import find_key
 from rubhpc.study import contact_axes
 from rubhpc.study.axes import (
     DRIVE_PREFIX,

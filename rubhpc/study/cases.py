@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
+import math
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -15,16 +16,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.errors import InputError
+from rubhpc.fem.assemble import assemble
+from rubhpc.fem.model import state_size
+from rubhpc.fem.response import check_response_node
+from rubhpc.fem.statics import find_rigid_body_mode, unheld_message
 from rubhpc.input.messages import place
+from rubhpc.rig.reading import with_keys
+from rubhpc.rig.stators import gap_problem
 from rubhpc.schema import STATE
-from rubhpc.study.axes import RUN_UP_TIME
+from rubhpc.study.axes import FROM_REST, RUN_UP_TIME
 from rubhpc.study.continuation import CaseIds, continuation_of
-from rubhpc.study.final_states import check_start, count_state
 from rubhpc.study.identity import identity_parts
+from rubhpc.study.initial import KNOCKED
 from rubhpc.study.operating_points import operating_points_of
-from rubhpc.study.point_checks import check_gap, check_points
 from rubhpc.study.points import MOST_CASES, Points, boxed
-from rubhpc.study.predicted_steps import predicted_steps
 from rubhpc.study.warnings import decay_of, warnings_of
 
 if TYPE_CHECKING:
@@ -32,12 +37,122 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rubhpc.fem.model import Model
     from rubhpc.rig.rig import Rig
     from rubhpc.study.contact_keys import Contact
     from rubhpc.study.drive_law import DriveLaw
     from rubhpc.study.initial import Initial
+    from rubhpc.study.operating_points import OperatingPoints
+    from rubhpc.study.points import Index
     from rubhpc.study.speed_law import SpeedLaw
     from rubhpc.study.study import Study
+
+
+def check_points(points: OperatingPoints) -> None:
+    """Check what is known before clearances are.
+
+    Raises
+    ------
+    InputError
+        When the time step exceeds the stability limit of a rig, the modal scheme meets a rig with a
+        rigid-body mode, or an impulse acts on a node that does not move sideways.
+    """
+    if points.is_checked:
+        return
+    integrator = points.study.integrator
+    if integrator.step is not None and integrator.method == "central-difference":
+        _check_step(points, integrator.step)
+    if integrator.method == "modal":
+        _check_held(points)
+    _check_knocks(points)
+    points.is_checked = True
+
+
+def check_gap(points: OperatingPoints, least: float) -> None:
+    """Refuse a least clearance, m, that stators cannot have."""
+    varied = [i for i in points.rig_axes if points.study.axes[i].name.endswith("offset")]
+    is_ratio = points.is_clearance_ratio
+    for at in points.along(varied):
+        if problem := gap_problem(points.rig(at).stator, least, is_ratio=is_ratio):
+            raise InputError(f"[grid] {'clearance_ratio' if is_ratio else 'clearance'}: {problem}")
+
+
+def _check_step(points: OperatingPoints, step: float) -> None:
+    for index in points.along(points.rig_axes) if points.has_few_rigs else ():
+        limit = points.step_limit(index)
+        if step >= limit:
+            where = points.named(points.rig_axes, index)
+            problem = f"{step:g} s is above the stability limit{f' at {where}' if where else ''}"
+            raise InputError(f"[integrator] step: {problem}; use less than {limit:.3g} s")
+
+
+def _check_held(points: OperatingPoints) -> None:
+    """Refuse the modal scheme for a body that nothing holds: it has no constant response."""
+    for index in points.along(points.response_axes) if points.has_few_rigs else ():
+        if free := find_rigid_body_mode(points.model(index)):
+            raise InputError(unheld_message(free, points.named(points.response_axes, index)))
+
+
+def _check_knocks(points: OperatingPoints) -> None:
+    """Refuse an impulse on a node that does not move sideways."""
+    study = points.study
+    axis = next((axis for axis in study.axes if axis.name == KNOCKED), None)
+    nodes = [study.initial.impulse_node] if axis is None else axis.values
+    where = "[initial] impulse_node" if axis is None else f"[grid] {KNOCKED}"
+    first = points.model((0,) * len(points.points.dims))
+    for node in nodes:
+        if node is not None:
+            check_response_node(first, int(node), where)
+
+
+_MOST_RIGS = 64  # along an axis: assembled before the run, 1 ms each; of more values only the two ends
+
+
+def count_state(study: Study) -> int:
+    """Length of the final state of a case: displacement and velocity of each degree, two per stator.
+
+    Raises
+    ------
+    InputError
+        When it differs between cases: the final state of one cannot start another.
+    """
+    models = _models(study)
+    n_state = state_size(next(models)[1])
+    for name, model in models:
+        if state_size(model) == n_state:
+            continue
+        swept = next((a.name for a in study.axes if a.sweep != FROM_REST), None)
+        problem = "changes the number of degrees of freedom"
+        if swept is None:
+            fix = f'remove this axis, or "{STATE}" from [record] keep'
+            raise InputError(f"[grid] {name}: {problem}, so final states differ in length; {fix}")
+        problem += ", so a final state cannot start the next case"
+        raise InputError(f"[grid] {name}: {problem}; remove this axis, or the sweep of {swept}")
+    return n_state
+
+
+def check_start(study: Study) -> None:
+    """Refuse a state of a store that does not fit the rigs of a study.
+
+    Raises
+    ------
+    InputError
+        Names the degrees of freedom of both.
+    """
+    if study.initial.state is not None:
+        for _, model in _models(study):
+            study.initial.state.check_fit(model)
+
+
+def _models(study: Study) -> Iterator[tuple[str, Model]]:
+    """The model at the first values, named "", then those along each axis of the rig, few of a long one."""
+    first = {axis.name: axis.values[0] for axis in study.axes if axis.is_rig_key}
+    yield "", assemble(with_keys(study.rig, first))
+    for axis in study.axes:
+        values = axis.values if len(axis.values) <= _MOST_RIGS else axis.values[:: len(axis.values) - 1]
+        for value in values if axis.is_rig_key else ():
+            yield axis.name, assemble(with_keys(study.rig, {**first, axis.name: value}))
+
 
 _BLOCK = 16  # cases of a block by default, at most
 
@@ -289,3 +404,33 @@ def _named(study: Study) -> Iterator[None]:
         if study.source is None:
             raise
         raise InputError(f"{place(str(study.source))}: {error}") from None
+
+
+_EVENT_STEPS = 60  # that the modal scheme takes a revolution, samples apart
+_TOUCHING = 0.15  # share of the time in contact, where it takes short steps there
+
+
+def predicted_steps(points: OperatingPoints) -> NDArray[np.float64]:
+    """Steps of a case, of length 1 along the dimensions that do not change them."""
+    along = points.axes_of_steps
+    dims = points.dims(*along)
+    shape = [n if dim in dims else 1 for dim, n in enumerate(points.points.shape)]
+    steps = np.fromiter((_steps_of(points, index) for index in points.along(along)), dtype=np.float64)
+    return steps.reshape(shape)
+
+
+def _steps_of(points: OperatingPoints, index: Index) -> float:
+    study, contact, recording = points.study, points.contact(index), points.study.recording
+    per_revolution = _EVENT_STEPS + recording.samples_per_revolution
+    if study.changes_speed:
+        return float(points.speed_law(index).n_revolution * per_revolution)
+    modal_steps = recording.longest_transient * _EVENT_STEPS + recording.revolutions * per_revolution
+    is_modal = study.integrator.method == "modal"
+    if is_modal and (contact.closed_form == "always" or contact.is_smooth):
+        return float(modal_steps)
+    like = index if points.has_few_rigs else (0,) * len(points.points.dims)
+    turns = recording.longest_transient + recording.revolutions
+    duration = turns * 2 * math.pi / points.speed_of(index, like)
+    if is_modal:
+        return modal_steps + _TOUCHING * duration / study.integrator.contact_step(contact)
+    return duration / study.integrator.step_within(points.step_limit(like))

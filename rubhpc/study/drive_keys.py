@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from rubhpc.errors import InputError
 from rubhpc.input.fields import FieldError, check_fields, count, quantity, series
 from rubhpc.study.axes import DRIVE_AXES, DRIVE_PREFIX
-from rubhpc.study.changing_speed import check_changing
 from rubhpc.study.drive_law import DriveLaw
+from rubhpc.study.run_up_keys import check_changing
 from rubhpc.study.speed_law import MOST_REVOLUTIONS
 
 if TYPE_CHECKING:

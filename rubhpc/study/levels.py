@@ -16,7 +16,6 @@ its decision rests are, so that no level waits for the whole of the one before.
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -127,39 +126,6 @@ class Levels:
             known = is_computed[here]
             held = np.where(known.reshape(*known.shape, *[1] * (held.ndim - known.ndim)), values[here], held)
         return held
-
-    @property
-    def n_first(self) -> int:
-        """Cases of the first level."""
-        return self._size(self._first())
-
-    def count_ends(self, results: Results) -> int:
-        """Count the cases of the first level, all known, that the first halving asks for as well.
-
-        Where they come from the halving of another axis they may be inferred so far.
-        """
-        axis, _ = next(self._halvings(), (None, None))
-        if axis is None:
-            return 0
-        nodes = self._first()
-        known, tolerances = results.compared()
-        is_open = differ([values[self._at(nodes)] for values in known], tolerances, axis)
-        return int(_touched(_with_neighbours(is_open, axis), axis, nodes[axis], nodes[axis]).sum())
-
-    def count_places(self, axis: int) -> int:
-        """Count the cases of the level on which the halving of an axis begins."""
-        return math.prod(
-            len(_every(n, self.coarse)) if dim == axis else len(places)
-            for dim, (n, places) in enumerate(zip(self.shape, self.places_of_lines(axis), strict=True))
-        )
-
-    def places_of_lines(self, axis: int) -> list[NDArray[np.int64]]:
-        """Indices along each dimension of the lines that are halved along an axis.
-
-        The axes that are refined before it have all their values then, those after it the first ones.
-        """
-        later = self.refined[self.refined.index(axis) + 1 :]
-        return [_every(n, self.coarse) if dim in later else np.arange(n) for dim, n in enumerate(self.shape)]
 
     def _expected(self, asked: NDArray[np.bool_], n_done: int) -> int:
         """About how many cases there will be: an edge takes as many more on each level of its axis."""

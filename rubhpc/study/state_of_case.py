@@ -14,8 +14,7 @@ from rubhpc.input.messages import brief
 from rubhpc.input.quantity import parse_quantity
 from rubhpc.rig.reading import rig_from_dict, with_keys
 from rubhpc.schema import DONE, FINAL_STATE, STATUS
-from rubhpc.study.axes import coordinate_of, is_of_table
-from rubhpc.study.axis_values import place_of, study_unit
+from rubhpc.study.axes import coordinate_of, is_of_table, place_of, study_unit
 from rubhpc.study.stored_state import StoredState
 
 if TYPE_CHECKING:

@@ -2,36 +2,211 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rubhpc.errors import InputError
-from rubhpc.input.messages import brief, place, quoted
+from rubhpc.fem.assemble import assemble
+from rubhpc.fem.probes import with_probes
+from rubhpc.input.messages import brief, nearest, place, quoted
+from rubhpc.input.quantity import parse_quantity
 from rubhpc.input.reading import build, plain, read_toml, refuse_unknown
-from rubhpc.rig.reading import read_rig
-from rubhpc.rig.stators import has_bent_stator
+from rubhpc.rig.reading import read_rig, with_keys
+from rubhpc.rig.stators import gap_problem, has_bent_stator
+from rubhpc.schema import VARIABLES
 from rubhpc.study import contact_axes
-from rubhpc.study.axes import BOTH, DIRECTION, FROM_REST, SPEED_AXES, Axis, direction_axis
-from rubhpc.study.axis_reading import flatten, make_axis, make_range
-from rubhpc.study.branch_keys import BranchKeys, check_branch
-from rubhpc.study.changing_speed import refuse_speeds, speed_axis
-from rubhpc.study.checks import check_axes, check_rigs
+from rubhpc.study.axes import (
+    BOTH,
+    CLEARANCE_AXES,
+    DIRECTION,
+    FROM_REST,
+    NO_NEIGHBOURS,
+    SPEED_AXES,
+    Axis,
+    direction_axis,
+)
+from rubhpc.study.axis_reading import flatten, make_axis, make_range, unit_of
+from rubhpc.study.branch_keys import BranchKeys, branch_axis, check_branch
 from rubhpc.study.contact_axes import check_contacts
 from rubhpc.study.contact_keys import Contact, ContactKeys
 from rubhpc.study.drive_keys import DriveKeys, check_drive, first_speed
 from rubhpc.study.initial import CONTACT_FREE, Initial, check_initials
 from rubhpc.study.refine import Refine
-from rubhpc.study.run_up_keys import RunUpKeys, check_run_up
+from rubhpc.study.run_up_keys import RunUpKeys, check_run_up, refuse_speeds, speed_axis
 from rubhpc.study.sampling import draw
 from rubhpc.study.state_of_case import with_state
-from rubhpc.study.study_tables import line_of_text, overridden, read_axes, read_branch, table_of
 from rubhpc.study.tables import Integrator, Recording, Run, Sample, check_bent
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
     from os import PathLike
 
+    from rubhpc.rig.probes import Probe
     from rubhpc.rig.rig import Rig
+
+
+def line_of_text(table: dict[str, Any], key: str, default: str, file: str) -> str:
+    """A key whose value is one line of text."""
+    value = table.get(key, default)
+    if not isinstance(value, str) or not value.strip() or not value.isprintable():
+        raise InputError(f'{place(file, "", key)}: {brief(value)} is not a line of text; write {key} = "..."')
+    return value
+
+
+def table_of(table: dict[str, Any], key: str, file: str) -> dict[str, Any]:
+    """A table by its name; empty where it is left out."""
+    value = table.get(key, {})
+    if not isinstance(value, dict):
+        raise InputError(
+            f"{place(file, key)}: {brief(value)} is not a table; write [{key}] and its keys below"
+        )
+    return value
+
+
+def overridden(rig: Rig, table: dict[str, Any], file: str) -> Rig:
+    """The rig with the values of [override]."""
+    try:
+        return with_keys(rig, dict(flatten(table)))
+    except InputError as error:
+        raise InputError(f"{place(file, 'override')} {error}") from None
+
+
+def read_branch(
+    table: dict[str, Any],
+    grid: dict[str, Any],
+    rig: Rig,
+    sample: Sample | None,
+    file: str,
+    *,
+    is_refined: bool,
+) -> BranchKeys:
+    """Return the table [branch], its step in the unit of its axis."""
+    along, step = table.get("along"), table.get("step")
+    axes = dict(flatten(grid))
+    if isinstance(along, str) and along not in axes:
+        meant = nearest(along, axes)
+        fix = meant if meant.startswith("did") else "add it as { start, stop }"
+        raise InputError(f"{place(file, 'branch', 'along')}: {along} is not an axis of the grid; {fix}")
+    if sample is not None:
+        fix = "a sample has no axis to follow; remove [sample] or [branch]"
+        raise InputError(f"{place(file, 'branch')}: {fix}")
+    if is_refined:
+        raise InputError(f"{place(file, 'branch')}: branches are not refined; remove [refine] or [branch]")
+    if isinstance(along, str) and isinstance(step, str):
+        where = place(file, "branch", "step")
+        try:
+            table = {**table, "step": parse_quantity(step, unit_of(along, rig), where)}
+        except InputError as error:
+            raise InputError(str(error) if where in str(error) else f"{where}: {error}") from None
+    return build(BranchKeys, table, file, "branch")
+
+
+def read_axes(
+    table: dict[str, Any], rig: Rig, sample: Sample | None, file: str, along: str
+) -> tuple[Axis, ...]:
+    """The axes of [grid], those of a sample drawn; `along` is the axis of a branch."""
+    pairs = flatten(table)
+    names = [name for name, _ in pairs]
+    if len(names) > _MOST_AXES:
+        problem = f"{len(names)} axes are too many; use at most {_MOST_AXES}, and [override] for the others"
+        raise InputError(f"{place(file, 'grid')}: {problem}")
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"{place(file, 'grid', name)}: is duplicated; remove one")
+    if sample is None:
+        return tuple(
+            (branch_axis if name == along else make_axis)(name, values, rig, file) for name, values in pairs
+        )
+    axes = [(make_range if isinstance(v, dict) else make_axis)(name, v, rig, file) for name, v in pairs]
+    try:
+        return draw(axes, sample)
+    except InputError as error:
+        raise InputError(f"{place(file)}: {error}") from None
+
+
+# Names that a store takes for itself; an axis `clearance` is the very setting of that name.
+_RESERVED = (set(VARIABLES) | {"stator", "sample", "order", "section", "revolution", "degree"}) - {
+    "clearance"
+}
+_MOST_RIGS = 4096  # tried out one by one; of more, only those along each axis
+
+
+def check_axes(axes: tuple[Axis, ...]) -> None:
+    """Refuse axes that lack one that is needed, or set one thing twice."""
+    names = [axis.name for axis in axes]
+    for options, example in (
+        (SPEED_AXES, "speed_ratio = [0.75, 1.5]"),
+        (CLEARANCE_AXES, "clearance_ratio = 0.7"),
+        (("friction",), "friction = 0.3"),
+    ):
+        given = [name for name in names if name in options]
+        if not given:
+            raise InputError(f"[grid] {options[0]}: missing; add {' or '.join(options)}, such as {example}")
+        if len(given) > 1:
+            raise InputError(f"[grid] {given[1]}: conflicts with {given[0]}; give only one of them")
+    swept = [axis.name for axis in axes if axis.sweep != FROM_REST]
+    if len(swept) > 1:
+        raise InputError(f"[grid] {swept[1]}: sweep: {swept[0]} is swept already; remove one sweep")
+    if swept and any(axis.dimension != axis.coordinate for axis in axes):
+        raise InputError(f"[grid] {swept[0]}: sweep: {NO_NEIGHBOURS}")
+    taken: dict[str, str] = {}
+    for axis in axes:
+        if axis.coordinate in _RESERVED:
+            fix = "name one stator, such as stator.1.lateral" if axis.is_rig_key else "remove it"
+            raise InputError(f"[grid] {axis.name}: {axis.coordinate} is another variable of a store; {fix}")
+        if axis.coordinate in taken:
+            raise InputError(
+                f"[grid] {axis.name}: is the same dimension as {taken[axis.coordinate]}; remove one"
+            )
+        taken[axis.coordinate] = axis.name
+        for other in axes:
+            without_numbers = ".".join(part for part in axis.name.split(".") if not part.isdigit())
+            if other.name == without_numbers != axis.name:
+                raise InputError(f"[grid] {axis.name}: is also set by the axis {other.name}; remove one")
+
+
+def check_rigs(rig: Rig, axes: tuple[Axis, ...], probes: tuple[Probe, ...] = ()) -> None:
+    """Refuse a grid some of whose rigs cannot be, or cannot be studied, or whose probes see nothing."""
+    rig_axes = [axis for axis in axes if axis.is_rig_key]
+    names = [axis.name for axis in rig_axes]
+    grid: Iterable[tuple[float, ...]]
+    if math.prod(len(axis.tried) for axis in rig_axes) <= _MOST_RIGS:
+        grid = itertools.product(*(axis.tried for axis in rig_axes))
+    else:
+        first = [axis.tried[0] for axis in rig_axes]
+        grid = itertools.chain.from_iterable(
+            ((*first[:i], value, *first[i + 1 :]) for value in axis.tried) for i, axis in enumerate(rig_axes)
+        )
+    for values in grid:
+        case = dict(zip(names, values, strict=True))
+        try:
+            _check_rig(with_keys(rig, case), axes)
+        except InputError as error:
+            if not case:
+                raise
+            values_text = ", ".join(f"{name} = {value:g}" for name, value in case.items())
+            raise InputError(f"[grid] {values_text}: invalid rig: {error}") from None
+    if probes:  # of the first rig, since each is assembled for it
+        chosen = with_keys(rig, {axis.name: axis.tried[0] for axis in rig_axes})
+        model = assemble(chosen)
+        with_probes(model, chosen, probes, next(iter(model.rotor.tabulated_speeds), 0.0))
+
+
+def _check_rig(rig: Rig, axes: tuple[Axis, ...]) -> None:
+    if not rig.stator:
+        raise InputError(f"rig: {rig.name} has no stator to touch; add a [[stator]] to it")
+    by_name = {axis.name: axis for axis in axes}
+    if "clearance_ratio" in by_name and not any(u.mass * u.radius for u in rig.rotor.unbalance):
+        problem = f"{rig.name} has no unbalance, so no contact-free amplitude"
+        raise InputError(f"[grid] clearance_ratio: {problem}; give clearance instead, or an unbalance")
+    if "clearance" in by_name:
+        problem = gap_problem(rig.stator, min(by_name["clearance"].tried))
+        if problem:
+            raise InputError(f"[grid] clearance: {problem}")
+
 
 __all__ = [
     "Axis",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.fem.assemble import assemble
-from rubhpc.fem.lasting import decay_message, undamped_message
+from rubhpc.fem.stability import decay_message, undamped_message
 from rubhpc.fem.statics import sag_remark
 from rubhpc.units import typed_quantity
 

@@ -237,12 +237,12 @@ def test_plan_times_a_transient_that_ends_by_itself(tmp_path, capsys):
 
 
 def test_plan_shows_why_its_cases_failed(tmp_path, monkeypatch, capsys):
-    from rubhpc.running import timed_cases
+    from rubhpc.running import sampled_cases
 
     def burst(*_: object, **__: object) -> None:
         raise ZeroDivisionError("by\nzero")
 
-    monkeypatch.setattr(timed_cases, "record_of", burst)
+    monkeypatch.setattr(sampled_cases, "record_of", burst)
     code, out, err = call(capsys, "plan", write_study(tmp_path))
     assert (code, err) == (0, "")
     assert "core-hours unknown: the timed cases failed" in out

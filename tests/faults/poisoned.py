@@ -21,7 +21,7 @@ from rubhpc.running.launch import end_with_launcher, launch
 end_with_launcher()  # before what takes long, as the command does
 
 from rubhpc.cli import main  # noqa: E402
-from rubhpc.running import watchdog, worker  # noqa: E402
+from rubhpc.running import worker  # noqa: E402
 
 FOLDER = Path(__file__).with_name("poison")
 mode = sys.argv.pop(1)
@@ -41,7 +41,7 @@ if mode not in ("rank1", "exit1"):
     import poison
 
     poison.install(mode)
-    watchdog.PATIENCE = worker.PATIENCE = 1.0
+    worker.PATIENCE = 1.0
 elif launch().rank == 1:
     worker.Worker.work = slip  # type: ignore[method-assign]
 main()

@@ -10,7 +10,7 @@ from scipy.linalg import eigvals
 
 from postproc.figures.linear_design import campbell_diagram
 from rubhpc.fem.assemble import assemble
-from rubhpc.fem.campbell import campbell, critical_speeds
+from rubhpc.fem.critical_speeds import campbell, critical_speeds
 from rubhpc.fem.modes import modes
 from rubhpc.fem.rotor import assemble_rotor
 from rubhpc.rig.parts import Bearing, Disc, ShaftSection, Torsion

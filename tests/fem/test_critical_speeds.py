@@ -11,8 +11,7 @@ from scipy.optimize import brentq
 from trial_rig import trial_rig
 
 from rubhpc import Rig, Unbalance, assemble, read_rig
-from rubhpc.fem.campbell import campbell, critical_speeds
-from rubhpc.fem.critical_speeds import find_critical_speeds
+from rubhpc.fem.critical_speeds import campbell, critical_speeds, find_critical_speeds
 from rubhpc.fem.linear_design import linear_design
 from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.rig.parts import Bearing, Disc, ShaftSection

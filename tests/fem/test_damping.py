@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from rubhpc.fem.damping import rayleigh_coefficients
+from rubhpc.fem.beam import rayleigh_coefficients
 from rubhpc.rig.parts import Damping
 
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from typing import get_args
 
-from rubhpc.fem.forces import lateral_force
+from rubhpc.fem.assemble import lateral_force
 from rubhpc.fem.rotor import assemble_rotor
 from rubhpc.fem.stator import assemble_stator
-from rubhpc.rig.forces import NodeForce
-from rubhpc.rig.rotors import AnyRotor
+from rubhpc.rig.rotors import AnyRotor, NodeForce
 from rubhpc.rig.stators import AnyStator
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from rubhpc import assemble, read_rig
-from rubhpc.fem.lasting import stator_names, undamped, undamped_message
 from rubhpc.fem.modes import modes
+from rubhpc.fem.stability import stator_names, undamped, undamped_message
 from rubhpc.rig.reading import PACKAGED, with_keys
 
 ROTOR = (PACKAGED / "mokhtar2017.toml").read_text().split("[[stator]]")[0]

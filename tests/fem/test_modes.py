@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from rubhpc.fem.assemble import assemble
-from rubhpc.fem.modes import modes
+from rubhpc.fem.modes import modes, whirl_index, whirl_word
 from rubhpc.fem.rotor import assemble_rotor
-from rubhpc.fem.whirl import whirl_index, whirl_word
 from rubhpc.rig.parts import Bearing, Damping, Disc, ShaftSection, Torsion
 from rubhpc.rig.reading import read_rig
 from rubhpc.rig.rig import Rig

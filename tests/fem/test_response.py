@@ -15,11 +15,10 @@ from rubhpc.fem.response import (
     steady_response,
     step_limit,
 )
-from rubhpc.rig.forces import Unbalance
 from rubhpc.rig.parts import Bearing, Damping, Disc, ShaftSection
 from rubhpc.rig.reading import read_rig
 from rubhpc.rig.rig import Rig
-from rubhpc.rig.rotors import Rotor
+from rubhpc.rig.rotors import Rotor, Unbalance
 
 # all but rigid and massless: a mass on two bearings
 RIGID = ShaftSection(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rubhpc
-from rubhpc.fem import constraints
+from rubhpc.fem import statics
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.stator import assemble_stator
 
@@ -43,7 +43,7 @@ def test_a_place_of_its_own_is_kept(changes):
 
 def test_a_body_of_several_stators_is_searched_once(monkeypatch):
     asked = []
-    monkeypatch.setattr(constraints, "rigid_body_row", lambda body, rows: asked.append(body) or 0)
+    monkeypatch.setattr(statics, "rigid_body_row", lambda body, rows: asked.append(body) or 0)
     model = assemble(ring(8, height=6e-3))
-    assert constraints.find_rigid_body_mode(model) == ""
+    assert statics.find_rigid_body_mode(model) == ""
     assert asked == [model.rotor, model.stators[0].body, model.stators[-1].body]

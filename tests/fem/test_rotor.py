@@ -6,11 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rubhpc.fem.forces import forces_on
+from rubhpc.fem.assemble import forces_on
 from rubhpc.fem.rotor import assemble_rotor
-from rubhpc.rig.forces import Unbalance
 from rubhpc.rig.parts import Bearing, Damping, Disc, ShaftSection, Torsion
-from rubhpc.rig.rotors import Rotor
+from rubhpc.rig.rotors import Rotor, Unbalance
 
 STEEL = {"youngs_modulus": 2.1e11, "shear_modulus": 8e10, "density": 7800.0}
 SHAFT = (

@@ -12,8 +12,8 @@ from rubhpc.fem.separation_margin import (
     amplitude_over_speed,
     grid_through,
     response_peaks,
+    unbalance_response,
 )
-from rubhpc.fem.unbalance_response import unbalance_response
 
 OMEGA, ECCENTRICITY = 100.0, 1e-5
 

@@ -10,7 +10,7 @@ import pytest
 
 from rubhpc.input.fields import check_value, parse_field
 from rubhpc.input.reading import build
-from rubhpc.rig import bearing_table, forces, parts, rig, rotors, stators, supports
+from rubhpc.rig import bearing_table, parts, rig, rotors, stators, supports
 from rubhpc.rig.reading import read_rig
 from rubhpc.simulate import simulate
 from rubhpc.study import axes, axis_reading, branch_keys, contact_keys, initial, refine, run_up_keys, tables
@@ -18,7 +18,7 @@ from rubhpc.study import axes, axis_reading, branch_keys, contact_keys, initial,
 TABLES = {
     cls
     for module in (
-        *(bearing_table, rig, rotors, forces, parts, stators, supports),
+        *(bearing_table, rig, rotors, parts, stators, supports),
         *(contact_keys, tables, initial, refine, run_up_keys, branch_keys),
     )
     for cls in vars(module).values()

@@ -8,8 +8,8 @@ from trial_rig import trial_rig
 
 from rubhpc import LumpedStator, read_rig, simulate
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
-from rubhpc.rig.forces import Load
 from rubhpc.rig.reading import with_keys
+from rubhpc.rig.rotors import Load
 
 STIFF = with_keys(read_rig("mokhtar2017"), {"stator.youngs_modulus": 3e10})
 COULOMB = {"friction_law": "coulomb"}

@@ -10,8 +10,8 @@ from scipy.linalg import block_diag
 from rubhpc import read_rig
 from rubhpc.fem.assemble import assemble
 from rubhpc.integrate.packing import pack, pairs_of
-from rubhpc.rig.forces import Unbalance
 from rubhpc.rig.parts import Bearing
+from rubhpc.rig.rotors import Unbalance
 
 SPIN, STEP = 350.0, 6e-7
 PACKAGED = read_rig("mokhtar2017")

@@ -11,7 +11,7 @@ from rubhpc.errors import InputError
 from rubhpc.knock_cases import LeastKnock, Progress, search_of
 from rubhpc.knocks import least_knock
 from rubhpc.running.knocks_on_ranks import least_knock_on
-from rubhpc.running.pool import Alone
+from rubhpc.running.pool import Pool
 from rubhpc.study.study import read_study
 
 RUBBING = "[1.0, 1.05, 1.1]"  # without contact-free motion: one knock each
@@ -25,7 +25,7 @@ def test_a_rank_goes_on_from_what_others_have_left(tmp_path):
     Progress(tmp_path / "kept").enter(first, LeastKnock())
     Progress(tmp_path / "kept", rank=3).enter(second, LeastKnock(knocks=7))
     found = least_knock_on(
-        Alone(), lambda: study, **HOW, progress=tmp_path / "kept", report=lambda *n: shown.append(n)
+        Pool(), lambda: study, **HOW, progress=tmp_path / "kept", report=lambda *n: shown.append(n)
     )
     assert shown == [(2, 3), (3, 3)]
     assert found.knocks.values.ravel().tolist()[:2] == [0, 7]
@@ -37,7 +37,7 @@ def test_a_rank_goes_on_from_what_others_have_left(tmp_path):
 
 def test_ranks_find_what_one_process_finds(tmp_path):
     study = read_study(write_knocks(tmp_path, RUBBING))
-    found = least_knock_on(Alone(), lambda: study, **HOW, progress=tmp_path / "kept", report=lambda *_: None)
+    found = least_knock_on(Pool(), lambda: study, **HOW, progress=tmp_path / "kept", report=lambda *_: None)
     assert found.identical(least_knock(study, **HOW))
 
 
@@ -45,7 +45,7 @@ def test_what_cannot_be_searched_is_refused(tmp_path):
     study = read_study(write_knocks(tmp_path, RUBBING))
     with pytest.raises(InputError, match="angles 0"):
         least_knock_on(
-            Alone(), lambda: study, **HOW | {"angles": 0}, progress=tmp_path / "kept", report=lambda *_: None
+            Pool(), lambda: study, **HOW | {"angles": 0}, progress=tmp_path / "kept", report=lambda *_: None
         )
 
 

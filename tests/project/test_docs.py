@@ -18,7 +18,7 @@ import pytest
 import rubhpc
 from rubhpc.cli import commands
 from rubhpc.errors import InputError, RubError, StoppedEarly, StoreError
-from rubhpc.running.crash import Crashed
+from rubhpc.running.ending import Crashed
 from rubhpc.running.pool import RankLost
 from rubhpc.study.points import Points
 from rubhpc.study.study import Recording, read_study

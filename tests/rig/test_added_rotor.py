@@ -15,10 +15,9 @@ from rubhpc.fem.rotor import assemble_rotor
 from rubhpc.input import reading
 from rubhpc.input.fields import FieldError, check_fields, quantity
 from rubhpc.rig import rig as rig_module
-from rubhpc.rig.forces import RotorForces
 from rubhpc.rig.reading import read_rig
 from rubhpc.rig.rig import Rig
-from rubhpc.rig.rotors import AnyRotor
+from rubhpc.rig.rotors import AnyRotor, RotorForces
 
 DEGREES = ((1, "v"), (1, "w"))
 JEFFCOTT = {"mass": 2.65, "stiffness": 1.43e5, "damping": 84.0}

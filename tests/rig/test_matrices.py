@@ -19,9 +19,9 @@ from rubhpc import (
     read_rig,
     simulate,
 )
-from rubhpc.fem.constraints import FLOATS, find_rigid_body_mode
 from rubhpc.fem.modes import modes
 from rubhpc.fem.response import first_lateral_frequency, steady_response, step_limit
+from rubhpc.fem.statics import FLOATS, find_rigid_body_mode
 from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.rig.parts import Torsion
 from rubhpc.rig.reading import rig_from_dict, with_keys

@@ -21,7 +21,7 @@ from rubhpc.errors import InputError
 from rubhpc.integrate.branches import case
 from rubhpc.running.plan import make_plan
 from rubhpc.running.progress import Progress
-from rubhpc.running.timed_cases import CaseTimer, Enough
+from rubhpc.running.sampled_cases import CaseTimer, Enough
 from rubhpc.study.study import read_study
 
 STUDY = """

@@ -18,9 +18,9 @@ from stub_physics import Physics, record
 from rubhpc.errors import InputError, RubError, StoppedEarly, StoreError
 from rubhpc.integrate.compilation import compilation
 from rubhpc.running import case_setup, computing, job, stopping, worker
+from rubhpc.running.case_setup import count_preparations
 from rubhpc.running.driver import run
-from rubhpc.running.pool import Alone
-from rubhpc.running.preparations import count_preparations
+from rubhpc.running.pool import Pool
 from rubhpc.schema import (
     DIVERGED,
     DONE,
@@ -401,16 +401,16 @@ def test_compilations_are_announced_and_are_no_time_of_the_run(physics, study, m
 def test_the_first_rank_alone_announces_compilations(physics, study, monkeypatch, capsys):
     monkeypatch.setattr(job, "_warm_up", lambda *_: compilation.announce_set_of("advance"))
     monkeypatch.setattr("rubhpc.integrate.compilation._announced", [])
-    monkeypatch.setattr(Alone, "rank", 1)
+    monkeypatch.setattr(Pool, "rank", 1)
     run(study)
     assert "compiling" not in capsys.readouterr().out
 
 
 def test_what_another_rank_compiles_is_no_time_of_the_run_either(physics, study, monkeypatch):
     monkeypatch.setattr(job, "_warm_up", lambda *_: time.sleep(0.25))  # for the other rank's kernels
-    gathered = Alone.gather
+    gathered = Pool.gather
     monkeypatch.setattr(
-        Alone,
+        Pool,
         "gather",
         lambda self, value: [value, value + 0.2] if isinstance(value, float) else gathered(self, value),
     )
@@ -443,7 +443,7 @@ def test_as_many_speeds_are_prepared_as_are_predicted(physics, tmp_path, write):
 def test_preparations_of_many_cases_are_predicted_from_a_part(tmp_path, monkeypatch):
     grid = CaseGrid(read_study(write_sample(tmp_path, n=64)))
     whole = count_preparations(grid, np.ones(grid.shape, bool))
-    monkeypatch.setattr("rubhpc.running.preparations._MOST_COUNTED", 200)
+    monkeypatch.setattr("rubhpc.running.case_setup._MOST_COUNTED", 200)
     part = count_preparations(grid, np.ones(grid.shape, bool))
     assert part.speed == pytest.approx(whole.speed, rel=0.25)
     assert part.friction == pytest.approx(whole.friction, rel=0.25)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from running import ROOT, write_study
 
-from rubhpc.running import kept_setups
+from rubhpc.running import case_setup
 from rubhpc.running.worker import integrate
 from rubhpc.study.cases import CaseGrid
 from rubhpc.study.study import read_study
@@ -25,9 +25,9 @@ def test_contact_modes_that_are_freed_are_solved_again_with_the_same_bits(study,
     grid = CaseGrid(study)
     cases = [case for block in grid.blocks() for case in grid.cases(block)]
     records, most, n_freed = [], [], 0
-    for limit in (kept_setups.MOST_BYTES, 0):
-        monkeypatch.setattr(kept_setups, "MOST_BYTES", limit)
-        kept, found, held = kept_setups.KeptSetups(study), [], []
+    for limit in (case_setup.MOST_BYTES, 0):
+        monkeypatch.setattr(case_setup, "MOST_BYTES", limit)
+        kept, found, held = case_setup.KeptSetups(study), [], []
         for case in [*cases, *cases]:  # once more, out of what is kept or again
             setup = kept.of(case)
             found.append(integrate(study, case, setup, case.initial))

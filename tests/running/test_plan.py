@@ -7,14 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rubhpc.running import block_time, plan, timed_cases, trail
-from rubhpc.running.kept_setups import MOST_BYTES
-from rubhpc.running.memory import memory, peak_memory
+from rubhpc.running import plan, sampled_cases
+from rubhpc.running.case_setup import MOST_BYTES, Preparations
 from rubhpc.running.plan import make_plan
-from rubhpc.running.plan_estimate import Estimate, estimate
-from rubhpc.running.preparations import Preparations
-from rubhpc.running.timed_cases import CaseTimer, Sample, part_of, spread
-from rubhpc.running.trail import Timed, Trail
+from rubhpc.running.plan_estimate import Timed, estimate
+from rubhpc.running.sampled_cases import CaseTimer, Sample, Trail, memory, part_of, peak_memory, spread
+from rubhpc.schema import FAILED
 from rubhpc.storage.duration import span
 from rubhpc.storage.new_manifest import manifest_of
 from rubhpc.study.cases import CaseGrid
@@ -71,13 +69,6 @@ def test_a_cut_case_widens_the_range():
     assert all(math.isnan(value) for value in estimate([], 1, 1.0))
 
 
-def test_a_scaled_estimate_is_as_uncertain_as_its_factor():
-    found = Estimate(2.0, 1.0, 4.0).scaled(10.0, 0.5)
-    assert found.seconds == 20.0
-    assert found.least < 10.0 < 40.0 < found.most
-    assert Estimate(2.0, 1.0, 4.0).scaled(10.0) == pytest.approx((20.0, 10.0, 40.0))
-
-
 @pytest.mark.parametrize("shape", [(7,), (40, 4), (10, 10, 10)])
 def test_sampled_cases_spread_over_all_axes(shape):
     found = list(spread(np.ones(shape, bool), 64))
@@ -118,12 +109,10 @@ class Physics:
     def __init__(self, monkeypatch, seconds):
         self.now, self.ran, self.held = 1000.0, [], 0.0
         clock = SimpleNamespace(monotonic=lambda: self.now, process_time=lambda: self.now)
-        monkeypatch.setattr(timed_cases, "time", clock)
-        monkeypatch.setattr(trail, "time", clock)
-        monkeypatch.setattr(timed_cases, "memory", lambda: self.held)
-        monkeypatch.setattr(timed_cases, "arrays_of", lambda _: {})
+        monkeypatch.setattr(sampled_cases, "time", clock)
+        monkeypatch.setattr(sampled_cases, "memory", lambda: self.held)
         monkeypatch.setattr(CaseTimer, "_load_kernels", lambda *_: None)
-        monkeypatch.setattr(timed_cases, "record_of", self._run)
+        monkeypatch.setattr(sampled_cases, "record_of", self._run)
         self._seconds = seconds
 
     def _run(self, grid, case, setups, state, check, note):
@@ -175,7 +164,7 @@ def test_long_cases_are_cut_and_extrapolated(study, monkeypatch):
 
 def test_a_case_is_cut_for_its_memory(study, monkeypatch):
     physics = Physics(monkeypatch, lambda case: 1.0)
-    physics.held = 2 * timed_cases.MOST_BYTES
+    physics.held = 2 * sampled_cases.MOST_BYTES
     sample, taken = physics.plan(study)
     assert sample.was_full
     assert taken < 0.1
@@ -187,22 +176,21 @@ def test_a_set_up_without_checks_is_cut(study, monkeypatch):
     def hang(*_: object) -> None:
         time.sleep(60.0)
 
-    monkeypatch.setattr(timed_cases.KeptSetups, "of", hang)
-    monkeypatch.setattr(timed_cases, "_MOST_LATE", 0.5)
+    monkeypatch.setattr(sampled_cases.KeptSetups, "of", hang)
     monkeypatch.setattr(CaseTimer, "_load_kernels", lambda *_: None)
     grid, began = CaseGrid(study), time.monotonic()
     timer = CaseTimer(grid, began + 0.3)
     sample = timer.time_cases(np.ones(grid.shape, bool), lambda _: 1.0, lambda _: None)
     assert time.monotonic() - began < 5.0
-    assert [case.share for case in sample.cases] == [0.0]
+    assert not any(case.share for case in sample.cases)
 
 
 def trail_of(study, monkeypatch, rows):
     """A trail of a case whose times, revolutions and contact modes are known."""
     case = CaseGrid(study).case((0, 0, 0))
-    monkeypatch.setattr(trail, "n_followed", lambda: 0)
+    monkeypatch.setattr(sampled_cases, "n_followed", lambda: 0)
     made = Trail(study, case)
-    made._rows = rows
+    made.rows = rows
     monkeypatch.setattr(made, "enter", lambda: None)
     return made
 
@@ -268,14 +256,15 @@ def test_a_block_is_timed_with_its_folders(tmp_path, monkeypatch):
     grid = CaseGrid(read_study(write_study(tmp_path)))
     manifest = manifest_of(grid)
     written, flushed = [], []
+    record = SimpleNamespace(status=FAILED)
 
     def write_whole(path, data, *, is_synced):
         written.append(path)
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(data)
 
-    monkeypatch.setattr(block_time, "write_whole", write_whole)
-    monkeypatch.setattr(block_time, "flush_to_disk", flushed.append)
-    assert block_time.time_block(manifest, {}) > 0.0
+    monkeypatch.setattr(sampled_cases, "write_whole", write_whole)
+    monkeypatch.setattr(sampled_cases, "flush_to_disk", flushed.append)
+    assert sampled_cases.time_block(manifest, record) > 0.0
     assert written == flushed
     assert len({path.parent for path in written}) == len(written)  # each in a new one

@@ -8,8 +8,8 @@ from running import run_here, stored_bytes, write_study
 from test_journal import HEADER, measures, write
 
 from rubhpc.schema import DONE, FAILED, MISSING
-from rubhpc.storage.contradictions import contradicted
 from rubhpc.storage.journal import Entry
+from rubhpc.storage.verify import contradicted
 
 
 def entry(seed, *, flat=2, checksum=7, status=DONE, reason="", wall_time=1.0):

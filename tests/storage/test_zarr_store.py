@@ -14,11 +14,10 @@ from rubhpc import __version__
 from rubhpc.errors import StoreError
 from rubhpc.schema import DIVERGED, DONE, FAILED, FINAL_STATE, MISSING, STATE, VARIABLES
 from rubhpc.storage import layout
-from rubhpc.storage.differences import differences
 from rubhpc.storage.disk import disk_errors, write_whole
 from rubhpc.storage.journal import Entry
 from rubhpc.storage.manifest import Manifest
-from rubhpc.storage.resume import bring_up_to_date, cases_without_files, grid_for, open_store
+from rubhpc.storage.resume import bring_up_to_date, cases_without_files, differences, grid_for, open_store
 from rubhpc.storage.store import Store, case_checksum
 from rubhpc.study.cases import CaseGrid
 from rubhpc.study.study import read_study

@@ -17,8 +17,8 @@ from rubhpc.rig.reading import with_keys
 from rubhpc.running.driver import run as run_here
 from rubhpc.running.plan import make_plan
 from rubhpc.running.recompute import reproduce
-from rubhpc.storage.differences import differences
 from rubhpc.storage.new_manifest import manifest_of
+from rubhpc.storage.resume import differences
 from rubhpc.storage.status import read_status
 from rubhpc.storage.store import Store
 from rubhpc.storage.verify import verify

@@ -10,7 +10,7 @@ import threading
 from dataclasses import dataclass, field
 from typing import Any
 
-from rubhpc.running.pool import Totals
+from rubhpc.running.pool import Pool, Totals
 
 
 @dataclass
@@ -110,10 +110,8 @@ class Simulation:
             assert self._turn.wait_for(lambda: self._current == rank, self.patience), "no turn came"
 
 
-class SimulatedRank:
+class SimulatedRank(Pool):
     """A rank; see `rubhpc.running.pool.Pool`."""
-
-    is_launched = False
 
     def __init__(self, simulation: Simulation, rank: int) -> None:
         self._simulation, self.rank, self.size = simulation, rank, simulation.size
@@ -121,22 +119,8 @@ class SimulatedRank:
     def from_first(self, make: Any) -> Any:
         return self._simulation.meet(self.rank, make() if self.rank == 0 else None)[0]
 
-    def claim(self) -> Totals:
-        return self._simulation.add(Totals(claimed=1))
-
     def add(self, increment: Totals) -> Totals:
         return self._simulation.add(increment)
 
-    def totals(self) -> Totals:
-        return self._simulation.add(Totals())
-
     def gather(self, value: object) -> list[Any]:
         return self._simulation.meet(self.rank, value)
-
-    def leave_lost(self) -> None: ...
-
-    def close(self) -> None: ...
-
-    def stop(self) -> None: ...
-
-    def abort(self, code: int, text: str = "") -> None: ...

@@ -8,9 +8,8 @@ from time_stepping import solve
 from trial_rig import STEEL
 
 from rubhpc import Rig, simulate
-from rubhpc.rig.forces import Unbalance
 from rubhpc.rig.parts import Bearing, Damping, Disc, ShaftSection, Torsion
-from rubhpc.rig.rotors import Rotor
+from rubhpc.rig.rotors import Rotor, Unbalance
 from rubhpc.rig.stators import Stator
 
 SIGNALS = ("vertical", "horizontal", "torsion", "stator_axial", "stator_lateral", "contact_force")

@@ -14,10 +14,9 @@ import time_stepping
 from record_distance import MOTIONS
 
 from rubhpc import simulate
-from rubhpc.rig.forces import Unbalance
 from rubhpc.rig.parts import Bearing, Damping, Disc, ShaftSection, Torsion
 from rubhpc.rig.rig import Rig
-from rubhpc.rig.rotors import Rotor
+from rubhpc.rig.rotors import Rotor, Unbalance
 from rubhpc.rig.stators import Stator
 
 STEEL = {"youngs_modulus": 2.1e11, "shear_modulus": 8e10, "density": 7800.0}

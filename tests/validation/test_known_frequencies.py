@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 
 from rubhpc.fem.assemble import assemble
-from rubhpc.fem.modes import modes
+from rubhpc.fem.modes import modes, undamped_modes
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
 from rubhpc.fem.rotor import assemble_rotor
-from rubhpc.fem.undamped import undamped_modes
 from rubhpc.rig.parts import Bearing, Damping, ShaftSection, Torsion
 from rubhpc.rig.reading import read_rig
 from rubhpc.rig.rotors import Rotor

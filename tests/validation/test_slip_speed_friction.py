@@ -9,7 +9,7 @@ from test_coulomb import PRESSED, pressed_onto_a_rim
 
 from rubhpc import Rig, simulate
 from rubhpc.errors import InputError
-from rubhpc.rig.forces import Load
+from rubhpc.rig.rotors import Load
 from rubhpc.rig.stators import LumpedStator
 from rubhpc.study.contact_keys import Contact
 

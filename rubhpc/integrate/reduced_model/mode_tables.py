@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.errors import InputError
-from rubhpc.fem.computable import FAR_APART
+from rubhpc.fem.model import FAR_APART
 from rubhpc.integrate.reduced_model.friction_mode import FrictionMode
 from rubhpc.kernels import contact_modes as kernel
 from rubhpc.kernels.contact_modes import LANES

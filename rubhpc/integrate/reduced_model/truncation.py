@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from rubhpc.errors import InputError
-from rubhpc.fem.constraints import find_rigid_body_mode, unheld_message
+from rubhpc.fem.statics import find_rigid_body_mode, unheld_message
 from rubhpc.integrate.packing import carrier_degrees, degrees_of, output_degrees, whole_system
 from rubhpc.integrate.reduced_model.coupling import Grouped, coupled_parts
 from rubhpc.kernels._jit import plain

@@ -12,9 +12,9 @@ from scipy.linalg import block_diag
 from rubhpc import read_rig
 from rubhpc.kernels.central_difference import CONTACT_UNSOLVED, DIVERGED, FINISHED
 from rubhpc.kernels.contact_pairs import V
-from rubhpc.rig.forces import Unbalance
 from rubhpc.rig.parts import Bearing
 from rubhpc.rig.reading import with_keys
+from rubhpc.rig.rotors import Unbalance
 
 PACKAGED = read_rig("mokhtar2017")
 STATOR = PACKAGED.stator[0]

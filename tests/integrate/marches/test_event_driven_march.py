@@ -26,11 +26,10 @@ from rubhpc.integrate.setup import prepare
 from rubhpc.integrate.tangent_motion import TangentMotion
 from rubhpc.kernels.case_progress import CONTACT_UNSOLVED
 from rubhpc.recent import forget
-from rubhpc.rig.forces import Unbalance
 from rubhpc.rig.parts import Bearing, Damping, Disc, ShaftSection, Torsion
 from rubhpc.rig.reading import with_keys
 from rubhpc.rig.rig import Rig
-from rubhpc.rig.rotors import Rotor
+from rubhpc.rig.rotors import Rotor, Unbalance
 from rubhpc.rig.stators import LumpedStator
 from rubhpc.schema import DIVERGED, DONE, SCHEMES
 from rubhpc.study.study import Contact, Integrator, Recording
