@@ -22,7 +22,7 @@ STEPS, PERIODIC = "for contact in short steps", "for periodic motions"
 RUN_UPS = "for run-ups"
 NEIGHBOURS = "for neighbouring motions, which distinguish chaos from order"
 # Sets of kernels, each announced, and compiled when a case first needs it -> seconds that it takes, about.
-_SECONDS = {COMMON: 10, STICK: 30, CURVED: 70, STEPS: 10, PERIODIC: 10, RUN_UPS: 10, NEIGHBOURS: 10}
+_SECONDS = {COMMON: 10, STICK: 15, CURVED: 30, STEPS: 10, PERIODIC: 10, RUN_UPS: 10, NEIGHBOURS: 10}
 _SETS = {  # kernel -> its set; all others are common
     "advance_friction": STICK,
     "change_states": STICK,

@@ -2,8 +2,8 @@
 
 Numba optimises a function when it is compiled and again in each caller into which it is linked, and
 generates machine code and a Python wrapper for it each time. Here it is optimised with the kernel that calls
-it, and nothing else: a first case with friction that sticks takes 1.55 times as long without, one that slides
-1.4 times (processor time, numba 0.68). `RUBHPC_PLAIN_NUMBA=1` switches this off, and so does a version of
+it, and nothing else: a first case with friction that sticks takes 1.95 times as long without, one that slides
+1.6 times (processor time, numba 0.68). `RUBHPC_PLAIN_NUMBA=1` switches this off, and so does a version of
 numba with which it has not been tried; results are the same to rounding.
 """
 

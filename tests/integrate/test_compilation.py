@@ -24,7 +24,7 @@ def test_each_part_is_announced_once(monkeypatch):
         f"compiling kernels for neighbouring motions, which distinguish chaos from order, {once} "
         "set 1 of at most 2, about 10 s on a free core",
         f"compiling kernels for contact in short steps, {once} about 10 s on a free core",
-        f"compiling kernels for friction with stick, {once} set 2 of at most 2, about 30 s on a free core",
+        f"compiling kernels for friction with stick, {once} set 2 of at most 2, about 15 s on a free core",
     ]
 
 
