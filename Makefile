@@ -50,7 +50,7 @@ test: $(VENV)/.ready ## all tests but those of `make faults` and `make bench`
 	$(BIN)/python -m pytest $(PARALLEL) -m "$(ORDINARY) and not serial"
 	$(BIN)/python -m pytest --durations=15 $(ALONE) -m "$(ORDINARY) and serial"
 
-kernels: $(VENV)/.installed ## compile the kernels, two to three minutes, unless that is done
+kernels: $(VENV)/.installed ## compile the kernels, a minute and a half, unless that is done
 	$(BIN)/python tests/support/kernel_cache.py
 
 # What `make test` leaves out is in one of these two.
