@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from postproc.figures.options import Axis, Count, Speed
 
-_LABEL_WIDTH = 18  # characters that fit next to a low panel
+_LABEL_WIDTH = 14  # characters that fit next to a low panel
 _UNIT = re.compile(r"\(.*\)$")
 
 

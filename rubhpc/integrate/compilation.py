@@ -7,7 +7,7 @@ import sys
 import threading
 import time
 from contextlib import ExitStack, contextmanager, suppress
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from numba.core import event
 
@@ -54,7 +54,7 @@ class _Compilation(event.Listener):
 
     @property
     def is_under_way(self) -> bool:
-        """Whether this process compiles now."""
+        """Whether this process compiles now, or waits for another that does."""
         return self._is_compiling
 
     def on_start(self, event: Any) -> None:
@@ -67,10 +67,18 @@ class _Compilation(event.Listener):
         with self._own:
             self._depth += 1
             if self._depth == 1:
-                self._began, self._is_compiling = time.perf_counter(), False
                 with suppress(OSError):  # a folder that cannot be written, or a file system without locks
-                    lock = self._held.enter_context((cache_folder() / "lock").open("w"))
-                    fcntl.flock(lock, fcntl.LOCK_EX)
+                    self._take(self._held.enter_context((cache_folder() / "lock").open("w")))
+                self._began, self._is_compiling = time.perf_counter(), False
+
+    def _take(self, lock: IO[str]) -> None:
+        """Take the lock of the cache; to wait for another process that compiles counts as compilation."""
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            began, self._is_compiling = time.perf_counter(), True
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            self.seconds += time.perf_counter() - began
 
     def on_end(self, event: Any) -> None:
         if event.kind == "numba:compile":

@@ -1,8 +1,12 @@
 """What users read of compilations, and how much is compiled."""
 
+import fcntl
 import subprocess
 import sys
+import threading
+import time
 
+import numba
 from running import environment
 
 from rubhpc.integrate import compilation
@@ -50,8 +54,6 @@ def test_parts_are_names_of_kernels():
 
 
 def test_their_time_is_counted_and_others_of_numba_are_not_announced():
-    import numba
-
     texts, before = [], compilation.seconds_compiling()
     with compilation.announced_by(texts.append):
         assert numba.njit(lambda x: x + 1.0)(1.0) == 2.0
@@ -106,3 +108,21 @@ def test_a_first_case_compiles_no_more_than_it_did(tmp_path):
     assert set(names) <= MAY_COMPILE
     assert len(names) == len(set(names))
     assert 20_000 < sum(map(int, counts)) < 105_000
+
+
+def test_waiting_for_another_process_counts(monkeypatch, tmp_path):
+    monkeypatch.setattr(compilation, "cache_folder", lambda: tmp_path)
+    before, seen = compilation.seconds_compiling(), []
+    with (tmp_path / "lock").open("w") as held:
+        fcntl.flock(held, fcntl.LOCK_EX)
+        waiting = threading.Thread(target=lambda: numba.njit(lambda x: x + 2.0)(1.0))
+        waiting.start()
+        while not compilation.is_compiling():
+            time.sleep(0.01)
+        seen.append(waiting.is_alive())
+        time.sleep(0.1)
+    waiting.join(60)
+    assert seen == [True]
+    assert not waiting.is_alive()
+    assert compilation.seconds_compiling() >= before + 0.1
+    assert not compilation.is_compiling()

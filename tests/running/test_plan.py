@@ -179,10 +179,10 @@ def test_a_set_up_without_checks_is_cut(study, monkeypatch):
     monkeypatch.setattr(sampled_cases.KeptSetups, "of", hang)
     monkeypatch.setattr(CaseTimer, "_load_kernels", lambda *_: None)
     grid, began = CaseGrid(study), time.monotonic()
-    timer = CaseTimer(grid, began + 0.3)
+    timer = CaseTimer(grid, began + 2.0)  # s, time enough to begin a case on a loaded machine
     sample = timer.time_cases(np.ones(grid.shape, bool), lambda _: 1.0, lambda _: None)
-    assert time.monotonic() - began < 5.0
-    assert not any(case.share for case in sample.cases)
+    assert time.monotonic() - began < 10.0
+    assert [case.share for case in sample.cases] == [0.0]
 
 
 def trail_of(study, monkeypatch, rows):
