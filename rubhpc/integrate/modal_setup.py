@@ -18,6 +18,7 @@ from rubhpc.integrate.reduced_model.contact_mode import (
     solve_contact_mode,
 )
 from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
+from rubhpc.integrate.reduced_model.flight_modes import FlightModes
 from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs, solve_friction_mode
 from rubhpc.integrate.reduced_model.mode_library import (
     ModeLibrary,
@@ -155,6 +156,11 @@ class ModalSetup:
         """Contact mode with every pair open, which does not depend on friction."""
         gap_jacobian, force_direction, _ = directions(self.reduced, self.model, 0.0)
         return solve_contact_mode(self.reduced, gap_jacobian, force_direction, 0, self._known_of_ring)
+
+    @cached_property
+    def flight_modes(self) -> FlightModes:
+        """What the collocation integrator takes of the set-up."""
+        return FlightModes(self)
 
     @cached_property
     def n_level(self) -> int:

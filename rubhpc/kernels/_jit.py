@@ -27,17 +27,16 @@ _FLAGS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": {"c
 # Sums over modes may be taken in any (fixed) order: otherwise no such loop is vectorised.
 _SUM_FLAGS: dict[str, Any] = {**_FLAGS, "fastmath": {"contract", "nsz", "reassoc"}}
 
-_PACKAGE = re.escape(__package__)
-_IMPORTS = re.compile(rf"\b{_PACKAGE}\.(\w+)|\bfrom {_PACKAGE} import ([\w ,]+|\([^)]*\))")
+_PACKAGE, _FOLDER = re.escape(__package__), Path(__file__).parent
+_IMPORTS = re.compile(rf"\b{_PACKAGE}((?:\.\w+)+)|\bfrom {_PACKAGE} import ([\w ,]+|\([^)]*\))")
 
 
 @cache
 def _imported_by(path: Path) -> frozenset[Path]:
-    """Files of this package that a file of it imports."""
+    """Files of this package and those in it that a file of them imports."""
     words = " ".join(chain.from_iterable(_IMPORTS.findall(path.read_text())))
-    return frozenset(
-        file for word in re.findall(r"\w+", words) if (file := path.with_name(f"{word}.py")).exists()
-    )
+    named = (_FOLDER.joinpath(*word.strip(".").split(".")) for word in re.findall(r"[\w.]+", words))
+    return frozenset(file for name in named if (file := name.with_suffix(".py")).exists())
 
 
 @cache

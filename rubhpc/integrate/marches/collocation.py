@@ -1,0 +1,172 @@
+"""A case by the collocation integrator: any smooth gap and any law."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.integrate.marches.march import ALL_SAMPLES, NO_FORCES
+from rubhpc.integrate.marches.modal import ModalMarch
+from rubhpc.integrate.reduced_model.flight_modes import FlightModes
+from rubhpc.kernels.collocation.march import advance_by_collocation
+from rubhpc.kernels.collocation.observing import Seen
+from rubhpc.kernels.collocation.structures import FORWARD, NORMAL, OPEN, CaseState, Solution, new_memory
+from rubhpc.kernels.sampling import Measured
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.modal_setup import ModalSetup
+    from rubhpc.integrate.record import State
+    from rubhpc.kernels.accumulators import Accumulator, Samples
+
+    Floats = NDArray[np.float64]
+
+
+class CollocationMarch(ModalMarch):
+    """A case in the modes of the open system; contact forces are polynomials in each step."""
+
+    def __init__(
+        self,
+        setup: ModalSetup,
+        clearance: float,
+        friction: float,
+        initial: State,
+        check: Callable[[], None] | None,
+    ) -> None:
+        """Start from `initial`, with the contacts closed that its forces press."""
+        super().__init__(setup, clearance, friction, initial, check)
+        self._modes: FlightModes = setup.flight_modes
+        self._contacts = self._modes.bodies(friction, self._clearance)
+        self._solution = self._new_solution()
+        self._seen: Seen | None = None
+        self._begin(initial.contact_force)
+
+    def _begin(self, contact_force: Floats) -> None:
+        modes, s = self._modes, self._modes.nodes.at.size
+        q = self._clearance.size
+        self._memory = new_memory()
+        self._case = CaseState(
+            x=modes.coordinates(self._motion),
+            state=np.where(contact_force > 0.0, FORWARD, OPEN),
+            force=np.zeros((q, 2, s)),
+            lasting=np.zeros(q),
+            since=np.zeros(q, dtype=np.int64),
+        )
+        self._case.force[:, NORMAL] = contact_force[:, None]
+        self._memory["event_tick"] = -(2**61)
+        self._memory["scale"] = max(1e-3, float(contact_force.max(initial=0.0)))
+        self._solution.states[:] = 0
+
+    def start_again(self, state: State) -> bool:
+        """Restart the same case at another state."""
+        self._stride = ALL_SAMPLES
+        self._begin_time()
+        self._motion[:] = self.reduced(state)
+        self._begin(state.contact_force)
+        return True
+
+    def motion(self) -> Floats:
+        """Reduced displacements, then velocities (2 n,), at the sample reached."""
+        motion: Floats = self._modes.motion @ self._case.x
+        return motion
+
+    def touching(self) -> NDArray[np.bool_]:
+        """Whether each pair is closed, (q,)."""
+        return self._case.state != OPEN
+
+    def _contact_force(self) -> Floats:
+        force = self._modes.nodes.power.T @ self._case.force[:, NORMAL].T  # powers
+        last = (self._memory["part"] ** np.arange(len(force))) @ force
+        return np.where(self.touching(), np.maximum(last, np.finfo(float).tiny), 0.0)
+
+    def _unsolved(self) -> str:
+        return NO_FORCES
+
+    def _new_solution(self) -> Solution:
+        modes = self._modes
+        n_y, n_x = modes.tables.free.shape[1:]
+        k, s, q, nl = modes.tables.is_filled.size, modes.nodes.at.size, self._clearance.size, modes.n_local
+        n_row, n, zeros = q * nl, q * (2 * s + (s - 1) * (nl - 1)), np.zeros
+        return Solution(
+            start=zeros(3 * n_row),
+            y=zeros(n_y),
+            y_free=zeros(n_y),
+            place=zeros((s, n_row)),
+            load=zeros(s * n_row),
+            gap=zeros(s * q),
+            curvature=zeros(s * q),
+            unit=zeros((s * q, 2)),
+            normal=zeros((s * q, nl)),
+            tangent=zeros((s * q, nl)),
+            normal_bend=zeros((nl, nl)),
+            tangent_bend=zeros((nl, nl)),
+            seen=zeros((s * q, 6)),
+            slope=zeros((s * q, 4)),
+            ratio=zeros((s * q, 2)),
+            bent=zeros((s * q, 3, nl)),
+            turning=zeros((s * q, nl, nl)),
+            direction=zeros((s * q, 2, nl)),
+            residual=zeros(n),
+            closed=zeros(q, dtype=np.int64),
+            matrix=zeros((k, n, n)),
+            pivot=zeros((k, n), dtype=np.int64),
+            states=zeros(k, dtype=np.int64),
+            noise=zeros(k),
+            change=zeros(n_y),
+            moved=zeros((s, n_row)),
+            begun=zeros(3 * n_row),
+            pushed=zeros((q, 2, s)),
+            changed=zeros((s, 6)),
+            guess=zeros((q, 2, s)),
+            instant=zeros((q, 2)),
+            touching=zeros(q, dtype=np.bool_),
+            kept=zeros(q, dtype=np.bool_),
+            waiting=zeros(q, dtype=np.bool_),
+            event=zeros((q, 2, s)),
+            after=zeros(n_x),
+            turn=zeros(modes.exponent.size, dtype=complex),
+            impulse=zeros((q, 2)),
+            speed=zeros((q, 2)),
+        )
+
+    def _new_seen(self, samples: Samples, accumulator: Accumulator) -> Seen:
+        signals, s = self._modes.signals, self._modes.nodes.at.size
+        measured = Measured(self._recorder, samples, accumulator)
+        if self._seen is not None:
+            return self._seen._replace(measured=measured)
+        n_x = self._case.x.size
+        return Seen(
+            begun=np.zeros(n_x),
+            moving=np.zeros(n_x),
+            other=np.zeros(n_x),
+            node=np.zeros((len(signals.value), s)),
+            end_rate=np.zeros((2, signals.smooth.size)),
+            factor=np.zeros((s, len(signals.power))),
+            read=np.zeros(signals.free.shape[1]),
+            part=np.zeros(s),
+            measured=measured,
+        )
+
+    def _kernel(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
+        modes = self._modes
+        self._seen = self._new_seen(samples, accumulator)
+        return advance_by_collocation(
+            self._contacts,
+            modes.nodes,
+            modes.tables,
+            modes.signals,
+            modes.power,
+            self.clock,
+            self._setup.accuracy,
+            last_tick,
+            is_recorded,
+            self._bare_progress,
+            self._memory[0],
+            self._case,
+            self._solution,
+            self._seen,
+        )

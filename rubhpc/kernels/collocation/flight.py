@@ -1,0 +1,115 @@
+"""Flights: from one look at the gaps to the next, by bounds that miss no touch."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import linked_sum
+from rubhpc.kernels.collocation.gaps import see_gap
+from rubhpc.kernels.collocation.structures import PENALTY, Bodies, CaseState, Solution
+from rubhpc.kernels.collocation.tables import turn_freely
+from rubhpc.kernels.coordinate_steps import floor_log2
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+GAP_TOLERANCE = 1e-13  # m: what a gap does within it is not looked at
+RECENT = 0.5  # of the last contact: so long a pair that has opened is looked at only now and then
+RARELY = 0.5  # of the time since it has opened
+
+
+@linked_sum
+def fly(
+    bodies: Bodies,
+    power: Complexes,
+    s: int,
+    tick_length: float,
+    tick: int,
+    last_tick: int,
+    unseen: int,
+    case: CaseState,
+    solution: Solution,
+) -> tuple[int, int, float, int]:
+    """Advance with all pairs open to the first touch, or to `last_tick`.
+
+    A gap is a convex function of the local motions, so that it stays above its tangent less half of a bound
+    of its acceleration times the time squared. The first ticks `unseen` are taken without a look.
+
+    Returns
+    -------
+    tick, pair : int
+        The pair that touches, or -1.
+    acceleration : float
+        Bound of that of its gap, m/s2.
+    n_look : int
+    """
+    n_complex, n_local, n_row = bodies.n_complex, bodies.n_local, bodies.load.shape[0]
+    n_mode, q = bodies.exponent.size, bodies.radius.size
+    x, after, turn, start, local, bend = case.x, solution.after, solution.turn, solution.start, bodies.local, bodies.bend
+    size, highest = np.empty(n_mode), power.shape[0] - 1
+    ahead, is_exact, n_look, begun = min(unseen, last_tick - tick), True, 0, tick
+    while True:
+        if ahead != 0:
+            if is_exact:
+                for k in range(n_mode):
+                    turn[k] = np.exp(bodies.exponent[k] * (ahead * tick_length))
+                turn_freely(n_complex, turn, x, after)
+            else:
+                level = min(floor_log2(ahead), highest)
+                ahead = 1 << level
+                turn_freely(n_complex, power[level], x, after)
+            for k in range(x.size):
+                x[k] = after[k]
+            tick += ahead
+        if tick >= last_tick:
+            return tick, -1, 0.0, n_look
+        n_look += 1
+        for k in range(n_complex):
+            size[k] = math.sqrt(x[k] * x[k] + x[n_complex + k] * x[n_complex + k])
+        for k in range(n_complex, n_mode):
+            size[k] = abs(x[n_complex + k])
+        for r in range(2 * n_row):
+            row, total = local[r], 0.0
+            for k in range(x.size):
+                total += row[k] * x[k]
+            start[r] = total
+        ahead, is_exact = last_tick - tick, False
+        for i in range(q):
+            first = i * n_local
+            see_gap(bodies, i, start, first, i * s, solution)
+            gap, rate, bound = solution.gap[i * s], 0.0, 0.0
+            for a in range(n_local):
+                slope, row, total = solution.normal[i * s, a], bend[first + a], 0.0
+                if slope != 0.0:
+                    for k in range(n_mode):
+                        total += row[k] * size[k]
+                    rate += slope * start[n_row + first + a]
+                    bound += abs(slope) * total
+            soft = bodies.damping[i] / bodies.stiffness[i] if bodies.normal_law[i] == PENALTY else 0.0
+            near = gap + soft * min(rate, 0.0)
+            least = math.sqrt(2.0 * GAP_TOLERANCE / bound)
+            age = (tick - case.since[i]) * tick_length
+            if age < RECENT * case.lasting[i]:
+                least = max(least, RARELY * age)
+            is_close = False
+            if rate < 0.0 and near < -rate * tick_length:
+                back = -int(near / (rate * tick_length)) if near < 0.0 and soft == 0.0 else 0
+                back = max(back, begun - tick)
+                if back == 0:
+                    return tick, i, bound, n_look
+                ahead, is_exact = back, True
+                break
+            if near <= 0.0:  # closed as yet, and opening: while the rate surely stays positive
+                free = max(least, rate / bound)
+            else:
+                root = math.sqrt(rate * rate + 2.0 * bound * near)
+                free = (root + rate) / bound if rate > 0.0 else 2.0 * near / (root - rate)
+                is_close = rate < 0.0 and bound * near < 0.5 * rate * rate
+                if not is_close:
+                    free = max(least, free)
+            ticks = max(1, int(min(free / tick_length, 1.0 * ahead)))
+            if ticks < ahead:
+                ahead, is_exact = ticks, is_close

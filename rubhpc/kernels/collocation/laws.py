@@ -1,0 +1,57 @@
+"""Laws of a pair: normal force of springs, and coefficient of friction, with their slopes."""
+
+from __future__ import annotations
+
+import math
+
+from rubhpc.kernels._jit import linked_sum
+from rubhpc.kernels.collocation.structures import HERTZ, Bodies
+from rubhpc.kernels.laws import COULOMB, STRIBECK, TABLE
+
+
+@linked_sum
+def spring_force(bodies: Bodies, i: int, gap: float, rate: float) -> tuple[float, float, float]:
+    """Normal force (N) of a spring law at a gap (m) and its rate (m/s), and its slopes in both.
+
+    Odd beyond contact, so that a step may pass the end of the contact.
+    """
+    k, c = bodies.stiffness[i], bodies.damping[i]
+    if bodies.normal_law[i] == HERTZ:  # with Hunt and Crossley's damping
+        root, damped = math.sqrt(abs(gap)), 1.0 - c * rate
+        return -k * gap * root * damped, -1.5 * k * root * damped, k * gap * root * c
+    return -k * gap - c * rate, -k, -c
+
+
+@linked_sum
+def spring_end(bodies: Bodies, i: int, gap: float, rate: float) -> float:
+    """Positive while the force of a spring law presses; it crosses zero with a slope."""
+    if bodies.normal_law[i] == HERTZ:
+        return -gap * (1.0 - bodies.damping[i] * rate)
+    return -gap - bodies.damping[i] / bodies.stiffness[i] * rate
+
+
+@linked_sum
+def friction_ratio(bodies: Bodies, i: int, slip: float) -> tuple[float, float]:
+    """Coefficient of friction in sliding at a slip (m/s), and its slope in it."""
+    law, friction = bodies.law, bodies.friction[i]
+    if law.friction_law == STRIBECK:
+        excess = friction * (law.static_friction_ratio - 1.0) * math.exp(-abs(slip) / law.stribeck_speed)
+        slope = -excess / law.stribeck_speed
+        return friction + excess, slope if slip >= 0.0 else -slope
+    if law.friction_law == TABLE:
+        at, values, speed = law.slip_speed, law.friction_ratio, abs(slip)
+        for k in range(1, at.size):
+            if speed < at[k]:
+                slope = friction * (values[k] - values[k - 1]) / (at[k] - at[k - 1])
+                value = friction * values[k - 1] + slope * (speed - at[k - 1])
+                return value, slope if slip >= 0.0 else -slope
+        return friction * values[-1], 0.0
+    return friction, 0.0
+
+
+@linked_sum
+def static_friction(bodies: Bodies, i: int) -> float:
+    """Largest coefficient of friction of a pair that sticks."""
+    if bodies.law.friction_law == COULOMB:
+        return bodies.friction[i] * bodies.law.static_friction_ratio
+    return friction_ratio(bodies, i, 0.0)[0]

@@ -1,0 +1,504 @@
+"""The collocation integrator: flights in closed form, steps with error control while a pair is closed."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import jit_sum, linked_sum
+from rubhpc.kernels.case_progress import CONTACT_UNSOLVED, DIVERGED, FINISHED, MOST_STEPS, PAUSED, Clock, Progress
+from rubhpc.kernels.collocation.events import fill_events, first_event
+from rubhpc.kernels.collocation.flight import GAP_TOLERANCE, fly
+from rubhpc.kernels.collocation.impacts import (
+    clear_impulses,
+    find_forces,
+    find_impulses,
+    is_jammed,
+    push_instant,
+    see_rates,
+    stop_opening,
+    stop_slip,
+)
+from rubhpc.kernels.collocation.newton import list_closed, see_start, take_step
+from rubhpc.kernels.collocation.observing import (
+    Seen,
+    Signals,
+    fill_signals,
+    record_flight,
+    record_impulses,
+    record_instant,
+    record_step,
+    value_at,
+)
+from rubhpc.kernels.collocation.structures import (
+    BACKWARD,
+    FORWARD,
+    FRICTION,
+    HARD,
+    NORMAL,
+    OPEN,
+    RATE,
+    SLIP,
+    STICKING,
+    Bodies,
+    CaseState,
+    Memory,
+    Nodes,
+    Solution,
+    Tables,
+)
+from rubhpc.kernels.collocation.tables import end_of_step, fill_step, within_step
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+Ints = NDArray[np.int64]
+
+STEPPING, TRYING, SETTLING = range(3)  # what is to be done next while a pair is closed
+NEWTON = 0.03  # tolerance of the forces in Newton's method, over that of the steps
+AVERAGED = 20e-6  # s: an error of the force in a shorter step counts as the error of its impulse over that time
+BEGINNING = 1.0 / 125.0  # first step of a contact over the last contact of the pair
+GROWING = 60.0  # steps are doubled where their error is so much less than the tolerance
+LEAST_SCALE = 1e-3  # N, of forces
+OPENED = 1e-3  # of the last contact: ticks after a release that are not looked at
+MOST_AT_ONCE = 64  # events at one tick, and as many for each pair
+NO_SLIP = 1e-9  # m/s
+PARTED = 1e-9  # of the rim's speed: gap rate above which a pair has parted in an impact
+
+
+@linked_sum
+def continue_forces(nodes: Nodes, part: float, ratio: float, force: Floats, guess: Floats) -> None:
+    """Forces of the last step continued over one that begins after `part` of it and is `ratio` times as long.
+
+    By their Legendre series, of one order less where the step is much longer.
+    """
+    s = nodes.at.size
+    most = s if ratio < 1.5 else s - 1
+    for j in range(s):
+        x = 2.0 * (part + nodes.at[j] * ratio) - 1.0
+        for i in range(force.shape[0]):
+            for f in range(2):
+                before, now, total = 1.0, x, 0.0
+                for m in range(most):
+                    coefficient = 0.0
+                    for k in range(s):
+                        coefficient += nodes.legendre[m, k] * force[i, f, k]
+                    total += coefficient * before
+                    later = ((2 * m + 3) * x * now - (m + 1) * before) / (m + 2)
+                    before, now = now, later
+                guess[i, f, j] = total
+
+
+@linked_sum
+def hold_forces(force: Floats, guess: Floats) -> None:
+    """Fill polynomials (q, 2, s) with constant forces (q, 2)."""
+    for i in range(guess.shape[0]):
+        for f in range(2):
+            for k in range(guess.shape[2]):
+                guess[i, f, k] = force[i, f]
+
+
+@linked_sum
+def error_of(
+    nodes: Nodes, state: Ints, before: Floats, guess: Floats, is_continued: bool, noise: float
+) -> float:
+    """Estimated error of the forces of a step, N: by their last coefficients and the jump from the last step."""
+    s, error = nodes.at.size, 0.0
+    for i in range(state.size):
+        if state[i] == OPEN:
+            continue
+        for f in range(2):
+            last = 0.0
+            for k in range(s):
+                last += nodes.legendre[s - 1, k] * guess[i, f, k]
+            error = max(error, 0.1 * abs(last))
+            if is_continued:
+                error = max(error, 0.5 * abs(guess[i, f, 0] - before[i, f, s - 1]))
+    return max(0.0, error - 30.0 * noise)
+
+
+@linked_sum
+def any_closed(state: Ints) -> bool:
+    """Whether a pair is closed."""
+    for i in range(state.size):
+        if state[i] != OPEN:
+            return True
+    return False
+
+
+@linked_sum
+def slot_within(tables: Tables, length: float) -> int:
+    """Slot of the longest step within a time, s."""
+    slot = tables.is_filled.size - 1
+    while slot > 0 and tables.tick * 2.0 ** (tables.first_level + slot) > length:
+        slot -= 1
+    return slot
+
+
+@linked_sum
+def take_event(
+    bodies: Bodies,
+    nodes: Nodes,
+    tables: Tables,
+    clock: Clock,
+    pair: int,
+    kind: int,
+    acceleration: float,
+    is_recorded: bool,
+    accuracy: float,
+    progress: Progress,
+    memory: Memory,
+    case: CaseState,
+    solution: Solution,
+    seen: Seen,
+) -> bool:
+    """Take an event of a pair: its new state, impulses, and the pairs that may then stick (`waiting`).
+
+    False where a force would press a gap closed that it should open.
+    """
+    s, state, x = nodes.at.size, case.state, case.x
+    see_start(bodies, x, solution)
+    was_alone = True
+    for i in range(state.size):
+        was_alone = was_alone and (state[i] == OPEN or i == pair)
+        solution.waiting[i] = False
+    lowest, top = int(np.int64(0)), tables.is_filled.size - 1
+    if state[pair] == OPEN:
+        state[pair] = FORWARD
+        solution.waiting[pair] = bodies.is_sticky
+        case.since[pair] = progress.tick
+        if was_alone:
+            memory.scale = LEAST_SCALE
+        if is_recorded:
+            seen.measured.accumulator.n_contact[pair] += 1
+        if bodies.normal_law[pair] == HARD:
+            if not strike(bodies, s, clock, pair, acceleration, is_recorded, accuracy, progress, memory, case, solution, seen):
+                return False
+        memory.slot = lowest
+        if case.lasting[pair] > 0.0:
+            memory.slot = slot_within(tables, BEGINNING * case.lasting[pair])
+    elif kind == NORMAL:
+        state[pair] = OPEN
+        if bodies.normal_law[pair] == HARD:
+            stop_opening(bodies, s, pair, solution, x)
+        case.lasting[pair] = (progress.tick - case.since[pair]) * clock.tick
+        case.since[pair] = progress.tick
+        memory.unseen = max(1 << tables.first_level, int(OPENED * case.lasting[pair] / clock.tick))
+        memory.slot = max(memory.slot - 3, lowest)
+    elif state[pair] == STICKING:
+        sense = value_at(nodes, case.force[pair, FRICTION], memory.part)
+        state[pair] = FORWARD if sense > 0.0 else BACKWARD
+        stop_slip(bodies, s, pair, solution, x)
+        memory.slot = max(memory.slot - 4, lowest)
+    else:
+        solution.waiting[pair] = True
+        state[pair] = STICKING
+        memory.slot = max(memory.slot - 4, lowest)
+    memory.slot = min(memory.slot, top)
+    return True
+
+
+@linked_sum
+def strike(
+    bodies: Bodies,
+    s: int,
+    clock: Clock,
+    pair: int,
+    acceleration: float,
+    is_recorded: bool,
+    accuracy: float,
+    progress: Progress,
+    memory: Memory,
+    case: CaseState,
+    solution: Solution,
+    seen: Seen,
+) -> bool:
+    """Take the impact of a hard pair that touches, with the impulses of the closed ones.
+
+    Rebounds end where no flight is seen: below a share, the accuracy, of the fastest approach, or within a
+    few ticks or the tolerance of gaps.
+    """
+    state = case.state
+    see_rates(bodies, s, pair, solution)
+    approach = -solution.seen[pair * s, RATE]
+    memory.fastest = max(memory.fastest, approach)
+    unseen = max(4.0 * clock.tick * acceleration, 4.0 * math.sqrt(2.0 * GAP_TOLERANCE * acceleration))
+    least = max(accuracy * memory.fastest, unseen)
+    for i in range(state.size):
+        solution.kept[i] = state[i] != OPEN and i != pair and bodies.normal_law[i] == HARD
+        solution.touching[i] = solution.kept[i] or i == pair
+    find_impulses(bodies, s, solution.touching, solution.kept, least, solution)
+    push_instant(bodies, s, solution.impulse, solution, case.x)
+    see_start(bodies, case.x, solution)
+    for i in range(state.size):
+        if not solution.touching[i]:
+            continue
+        see_rates(bodies, s, i, solution)
+        if is_jammed(bodies, s, i, FORWARD, solution):
+            return False
+        if solution.impulse[i, NORMAL] == 0.0 or bodies.restitution[i] > 0.0:
+            rate = solution.seen[i * s, RATE]
+            if rate > PARTED * (bodies.rim_speed[i] + approach) + 1e-12:
+                state[i], solution.waiting[i] = OPEN, False
+                case.lasting[i] = (progress.tick - case.since[i]) * clock.tick
+                case.since[i] = progress.tick
+                memory.unseen = 1
+                continue
+        state[i] = FORWARD if not solution.kept[i] else state[i]
+        solution.waiting[i] = bodies.is_sticky
+    if is_recorded:
+        record_impulses(bodies, s, clock, progress, solution, seen)
+    return True
+
+
+@linked_sum
+def begin_trial(
+    bodies: Bodies, s: int, i: int, is_still: bool, case: CaseState, solution: Solution
+) -> int:
+    """Return the state that is tried first for a pair that may stick."""
+    see_start(bodies, case.x, solution)
+    see_rates(bodies, s, i, solution)
+    slip = solution.seen[i * s, SLIP]
+    if abs(slip) > NO_SLIP and not is_still:
+        return FORWARD if slip > 0.0 else BACKWARD
+    return STICKING
+
+
+@linked_sum
+def is_diverged(bodies: Bodies, x: Floats) -> bool:
+    """Whether a displacement passes the limit or is NaN."""
+    for r in range(bodies.translations.shape[0]):
+        row, total = bodies.translations[r], 0.0
+        for k in range(x.size):
+            total += row[k] * x[k]
+        if not abs(total) <= bodies.displacement_limit:
+            return True
+    return False
+
+
+@jit_sum
+def advance_by_collocation(
+    bodies: Bodies,
+    nodes: Nodes,
+    tables: Tables,
+    signals: Signals,
+    power: Complexes,
+    clock: Clock,
+    accuracy: float,
+    last_tick: int,
+    is_recorded: bool,
+    progress: Progress,
+    memory: Memory,
+    case: CaseState,
+    solution: Solution,
+    seen: Seen,
+) -> int:
+    """Advance a case from the tick reached to `last_tick`.
+
+    `power` (levels, nm) are the exponentials of the modes over 2^level ticks. Returns an outcome of
+    `case_progress`.
+    """
+    s, x, state, after = nodes.at.size, case.x, case.state, solution.after
+    n_x, top = x.size, tables.is_filled.size - 1
+    last_step = progress.n_step + MOST_STEPS
+    todo, pair, kind, acceleration = STEPPING, -1, NORMAL, 0.0
+    tried, attempt, first_tried, is_still = STICKING, 0, STICKING, False
+    trial = int(np.int64(-1))
+    while True:
+        if todo == SETTLING:  # constants to begin with
+            see_start(bodies, x, solution)
+            if not find_forces(bodies, s, state, solution, solution.instant):
+                return CONTACT_UNSOLVED
+            hold_forces(solution.instant, case.force)
+            memory.length, todo = 0, STEPPING
+        if todo == STEPPING:
+            if progress.tick >= last_tick:
+                break
+            if progress.n_step > last_step:
+                return PAUSED
+        if todo == STEPPING and not any_closed(state):
+            begun = progress.tick
+            if is_recorded:
+                for k in range(n_x):
+                    seen.begun[k] = x[k]
+            tick, pair, acceleration, n_look = fly(
+                bodies, power, s, clock.tick, begun, last_tick, memory.unseen, case, solution
+            )
+            memory.unseen = 0
+            progress.n_step += n_look
+            if is_recorded:
+                record_flight(bodies, signals, power, clock, begun, tick, x, progress, seen)
+            progress.tick, kind = tick, NORMAL
+            if pair < 0:
+                continue
+        else:
+            slot = memory.slot
+            if todo == TRYING:
+                if trial < 0:
+                    for i in range(state.size):
+                        if solution.waiting[i]:
+                            trial = i
+                            break
+                    if trial < 0:
+                        todo = SETTLING
+                        continue
+                    tried = begin_trial(bodies, s, trial, is_still, case, solution)
+                    first_tried, attempt = tried, 0
+                state[trial], slot = tried, 0
+                see_start(bodies, x, solution)
+                if not find_forces(bodies, s, state, solution, solution.instant):
+                    return CONTACT_UNSOLVED
+                hold_forces(solution.instant, solution.guess)
+            else:
+                left = last_tick - progress.tick
+                while slot > 0 and 1 << (tables.first_level + slot) > 2 * left:
+                    slot -= 1
+                if memory.length > 0:
+                    ratio = (1 << (tables.first_level + slot)) / memory.length
+                    continue_forces(nodes, memory.part, ratio, case.force, solution.guess)
+                else:
+                    solution.guess[:] = case.force
+            if not tables.is_filled[slot]:
+                fill_step(bodies, nodes, tables, slot)
+            step = tables.tick * 2.0 ** (tables.first_level + slot)
+            n_iteration = take_step(
+                bodies, nodes, tables, slot, x, state, solution.guess, NEWTON * accuracy * memory.scale, False, solution
+            )
+            progress.n_step += 1
+            if todo == TRYING:
+                solution.waiting[trial] = False
+                if n_iteration < 0:
+                    return CONTACT_UNSOLVED
+                fill_events(bodies, nodes, state, solution.guess, accuracy, solution)
+                pressed, held, along = 0.0, 0.0, 0.0
+                for k in range(s):
+                    weight = nodes.integral[s - 1, k]
+                    pressed += weight * solution.event[trial, NORMAL, k]
+                    held += weight * solution.event[trial, FRICTION, k]
+                    along += weight * solution.guess[trial, FRICTION, k]
+                if pressed < 0.0:
+                    state[trial], case.since[trial] = OPEN, progress.tick
+                    memory.unseen, trial = 1 << tables.first_level, -1
+                elif held >= 0.0 or attempt >= 3:
+                    trial = -1
+                elif tried == STICKING:
+                    tried = FORWARD if along > 0.0 else BACKWARD
+                    attempt += 1
+                    solution.waiting[trial] = True
+                elif attempt > 1 or first_tried == STICKING:
+                    trial = -1
+                else:
+                    tried = STICKING
+                    attempt += 1
+                    solution.waiting[trial] = True
+                continue
+            error, largest = 0.0, memory.scale
+            if n_iteration > 0:
+                is_continued = memory.length > 0 and memory.part == 1.0
+                error = error_of(nodes, state, case.force, solution.guess, is_continued, solution.noise[slot])
+                error *= min(1.0, step / AVERAGED)
+                for i in range(state.size):
+                    if state[i] != OPEN:
+                        for k in range(s):
+                            largest = max(largest, abs(solution.guess[i, NORMAL, k]))
+            if n_iteration < 0 or error > accuracy * largest:
+                if slot > 0:
+                    memory.slot = slot - 1
+                    if n_iteration < 0:
+                        memory.length = 0
+                    continue
+                if n_iteration < 0:
+                    return CONTACT_UNSOLVED
+            fill_events(bodies, nodes, state, solution.guess, accuracy, solution)
+            place, pair, kind = first_event(bodies, nodes, state, solution)
+            whole = 1 << (tables.first_level + slot)
+            taken = whole
+            if place <= 1.0:
+                taken = int(place * whole + 0.5)
+            else:
+                pair = -1
+            if progress.tick + taken > last_tick:
+                taken, pair = last_tick - progress.tick, -1
+            if taken > 0:
+                if is_recorded:
+                    if not signals.is_filled[slot]:
+                        fill_signals(bodies, nodes, tables, signals, slot)
+                    n_closed = list_closed(bodies, nodes, state, solution)[0]
+                    record_step(
+                        bodies,
+                        nodes,
+                        tables,
+                        signals,
+                        slot,
+                        clock,
+                        taken,
+                        state,
+                        solution.guess,
+                        n_closed,
+                        x,
+                        progress,
+                        solution,
+                        seen,
+                    )
+                if taken == whole:
+                    end_of_step(bodies, tables, slot, x, solution.load, after)
+                else:
+                    within_step(bodies, nodes, step, taken / whole, x, solution.load, solution.turn, after)
+                for k in range(n_x):
+                    x[k] = after[k]
+                progress.tick += taken
+                case.force[:] = solution.guess
+                memory.scale, memory.length, memory.part = max(LEAST_SCALE, 0.999 * largest), whole, taken / whole
+                memory.slot = slot
+                if taken == whole and error < accuracy * largest / GROWING and slot < top:
+                    memory.slot = slot + 1
+            if pair < 0:
+                if is_diverged(bodies, x):
+                    return DIVERGED
+                continue
+        if progress.tick == memory.event_tick:
+            memory.n_at_once += 1
+            if memory.n_at_once > MOST_AT_ONCE * (1 + state.size):
+                return CONTACT_UNSOLVED
+        else:
+            memory.event_tick, memory.n_at_once = progress.tick, 0
+        progress.n_event += 1
+        is_still = kind == FRICTION
+        clear_impulses(solution.impulse)
+        if not take_event(
+            bodies,
+            nodes,
+            tables,
+            clock,
+            pair,
+            kind,
+            acceleration,
+            is_recorded,
+            accuracy,
+            progress,
+            memory,
+            case,
+            solution,
+            seen,
+        ):
+            return CONTACT_UNSOLVED
+        todo, trial = TRYING, -1
+    if is_recorded and progress.tick == clock.n_sample << clock.sample_level:
+        if progress.tick == progress.next_sample << clock.sample_level:
+            see_start(bodies, x, solution)
+            if not find_forces(bodies, s, state, solution, solution.instant):
+                return CONTACT_UNSOLVED
+            fill_instant_load(bodies, s, solution)
+            record_instant(bodies, signals, clock, case.force, x, progress, seen, solution.begun)
+    return FINISHED
+
+
+@linked_sum
+def fill_instant_load(bodies: Bodies, s: int, solution: Solution) -> None:
+    """Fill the first R of `begun` with the loads of the forces `instant`."""
+    n_local = bodies.n_local
+    for i in range(bodies.radius.size):
+        n, t = solution.instant[i, NORMAL], solution.instant[i, FRICTION]
+        for a in range(n_local):
+            solution.begun[i * n_local + a] = n * solution.normal[i * s, a] + t * solution.tangent[i * s, a]

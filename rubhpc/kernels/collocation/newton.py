@@ -1,0 +1,658 @@
+"""A step of closed contacts: forces that obey the laws at the nodes, by Newton's method.
+
+Unknown are the forces of the closed pairs at the nodes, N and, unless friction is a constant multiple of it,
+T; and the local displacements at the nodes after the first, by which the loads turn. The equations are
+
+- hard contact: `gap = faded error` at the nodes after the first, and the rate of it at the end;
+- springs: `N = law(gap, rate)` at the nodes after the first, and its rate at the end;
+- sticking: the same of the path of slip as of a hard gap;
+- sliding with a coefficient that depends on the slip: `T = +-mu(slip) N` at all nodes;
+- displacements that follow from the loads.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.kernels._jit import linked_sum
+from rubhpc.kernels.collocation.gaps import see_bend, see_gap, slip_path
+from rubhpc.kernels.collocation.laws import friction_ratio, spring_force
+from rubhpc.kernels.collocation.structures import (
+    ACROSS,
+    BEND,
+    BY_BOTH,
+    BY_GAP,
+    BY_GAP_TWICE,
+    BY_RATE,
+    FRICTION,
+    GAP,
+    HARD,
+    HERTZ,
+    NORMAL,
+    OF_BEND,
+    OF_RATE,
+    OF_SLIP,
+    OPEN,
+    RATE,
+    RATIO,
+    RATIO_SLOPE,
+    ROUND,
+    SLIP,
+    STICKING,
+    TURNED,
+    TWIST,
+    WIDENED,
+    Bodies,
+    Nodes,
+    Solution,
+    Tables,
+)
+from rubhpc.kernels.collocation.tables import bend_row, rate_row
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+MOST_ITERATIONS = 26
+ROUNDING = 2e-16  # of displacements
+SLOW = 0.2  # of the last change: with less progress the matrix is made anew
+
+
+@linked_sum
+def factorise(a: Floats, pivot: Ints, n: int) -> bool:
+    """Factors of a matrix in its place; False where it is singular."""
+    for k in range(n):
+        best, largest = k, abs(a[k, k])
+        for i in range(k + 1, n):
+            if abs(a[i, k]) > largest:
+                largest, best = abs(a[i, k]), i
+        pivot[k] = best
+        if not 0.0 < largest < np.inf:
+            return False
+        if best != k:
+            for j in range(n):
+                held = a[k, j]
+                a[k, j] = a[best, j]
+                a[best, j] = held
+        inverse, source = 1.0 / a[k, k], a[k]
+        for i in range(k + 1, n):
+            target = a[i]
+            factor = target[k] * inverse
+            target[k] = factor
+            if factor != 0.0:
+                for j in range(k + 1, n):
+                    target[j] -= factor * source[j]
+    return True
+
+
+@linked_sum
+def solve_factorised(a: Floats, pivot: Ints, n: int, b: Floats) -> None:
+    """Solve with the factors of `factorise`, in place of the right side."""
+    for k in range(n):
+        other = pivot[k]
+        if other != k:
+            held = b[k]
+            b[k] = b[other]
+            b[other] = held
+    for k in range(n):
+        total = b[k]
+        for j in range(k):
+            total -= a[k, j] * b[j]
+        b[k] = total
+    for k in range(n - 1, -1, -1):
+        total = b[k]
+        for j in range(k + 1, n):
+            total -= a[k, j] * b[j]
+        b[k] = total / a[k, k]
+
+
+@linked_sum
+def n_force(bodies: Bodies, state: int) -> int:
+    """Unknown forces of a closed pair at a node."""
+    return 1 if state != STICKING and not bodies.is_varied else 2
+
+
+@linked_sum
+def list_closed(bodies: Bodies, nodes: Nodes, state: Ints, solution: Solution) -> tuple[int, int, int]:
+    """Number of closed pairs, which are listed, and of unknown forces and of all unknowns."""
+    s, n_closed, n_unknown = nodes.at.size, 0, 0
+    for i in range(state.size):
+        if state[i] != OPEN:
+            solution.closed[n_closed] = i
+            n_closed += 1
+            n_unknown += s * n_force(bodies, state[i])
+    return n_closed, n_unknown, n_unknown + n_closed * (s - 1) * (bodies.n_local - 1)
+
+
+@linked_sum
+def see_start(bodies: Bodies, x: Floats, solution: Solution) -> None:
+    """Local motions, velocities and free accelerations at the coordinates x."""
+    start, local = solution.start, bodies.local
+    for r in range(start.size):
+        row, total = local[r], 0.0
+        for k in range(x.size):
+            total += row[k] * x[k]
+        start[r] = total
+
+
+@linked_sum
+def push_closed(bodies: Bodies, nodes: Nodes, state: Ints, force: Floats, n_closed: int, solution: Solution) -> None:
+    """Loads at the nodes by the forces and directions there; T of steady sliding follows from N."""
+    s, n_local, n_row = nodes.at.size, bodies.n_local, bodies.load.shape[0]
+    for c in range(n_closed):
+        i = solution.closed[c]
+        is_bound = n_force(bodies, state[i]) == 1
+        for k in range(s):
+            row, first = i * s + k, k * n_row + i * n_local
+            if is_bound:
+                force[i, FRICTION, k] = state[i] * bodies.friction[i] * force[i, NORMAL, k]
+            n, t = force[i, NORMAL, k], force[i, FRICTION, k]
+            for a in range(n_local):
+                solution.load[first + a] = n * solution.normal[row, a] + t * solution.tangent[row, a]
+
+
+@linked_sum
+def respond(tables: Tables, slot: int, n_row: int, n_local: int, n_closed: int, n_y: int, solution: Solution) -> None:
+    """Motion y under the loads of the closed pairs."""
+    y, y_free, forced, load = solution.y, solution.y_free, tables.forced[slot], solution.load
+    for r in range(n_y):
+        y[r] = y_free[r]
+    for k in range(load.size // n_row):
+        for c in range(n_closed):
+            first = k * n_row + solution.closed[c] * n_local
+            for a in range(first, first + n_local):
+                f, row = load[a], forced[a]
+                for r in range(n_y):
+                    y[r] += f * row[r]
+
+
+@linked_sum
+def see_pair(bodies: Bodies, nodes: Nodes, i: int, solution: Solution) -> None:
+    """Fill what is seen of a closed pair at the nodes, by its gaps there and the velocities of y."""
+    s, n_local, n_row = nodes.at.size, bodies.n_local, bodies.load.shape[0]
+    first, is_hard = i * n_local, bodies.normal_law[i] == HARD
+    for k in range(s):
+        row, is_last = i * s + k, k == s - 1
+        seen, normal, tangent = solution.seen[row], solution.normal[row], solution.tangent[row]
+        seen[GAP] = solution.gap[row]
+        rates, v = (solution.start, n_row + first) if k == 0 else (solution.y, rate_row(s, n_row, k) + first)
+        rate, across = 0.0, 0.0
+        for a in range(n_local):
+            rate += normal[a] * rates[v + a]
+            if a != TWIST:
+                across += tangent[a] * rates[v + a]
+        seen[RATE], seen[SLIP] = rate, bodies.rim_speed[i] + rates[v + TWIST] - across
+        seen[WIDENED] = seen[GAP] * solution.curvature[row] * across
+        seen[TURNED] = 0.0
+        if k > 0:
+            moved = solution.place[k, first + ACROSS] - solution.place[0, first + ACROSS]
+            twisted = solution.y[(k - 1) * n_row + first + TWIST] - solution.start[first + TWIST]
+            seen[TURNED] = twisted - slip_path(bodies, i, row, i * s, moved, solution)
+        if is_last and not is_hard:
+            see_bend(bodies, row, solution)
+            total, at = 0.0, bend_row(s, n_row) + first
+            for a in range(n_local):
+                total += normal[a] * solution.y[at + a]
+                for b in range(n_local):
+                    total += rates[v + a] * solution.normal_bend[a, b] * rates[v + b]
+            seen[BEND] = total
+
+
+@linked_sum
+def fill_residual(
+    bodies: Bodies, nodes: Nodes, tables: Tables, slot: int, state: Ints, force: Floats, n_closed: int, solution: Solution
+) -> None:
+    """Fill the residuals of all equations."""
+    s, n_local, n_row, residual = nodes.at.size, bodies.n_local, bodies.load.shape[0], solution.residual
+    step, fade, row = tables.tick * 2.0 ** (tables.first_level + slot), tables.fade[slot], 0
+    for c in range(n_closed):
+        i = solution.closed[c]
+        see_pair(bodies, nodes, i, solution)
+        seen, n, t = solution.seen[i * s : i * s + s], force[i, NORMAL], force[i, FRICTION]
+        first, end = seen[0], seen[s - 1]
+        is_hard = bodies.normal_law[i] == HARD
+        if is_hard:
+            for k in range(1, s):
+                residual[row + k - 1] = seen[k, GAP] - fade[k, 0] * first[GAP] - fade[k, 1] * first[RATE]
+            rate = end[RATE] - fade[s - 1, 2] * first[GAP] - fade[s - 1, 3] * first[RATE]
+            residual[row + s - 1] = step * rate
+        else:
+            by_gap, by_rate, grown = 0.0, 0.0, 0.0
+            for k in range(1, s):
+                wanted, by_gap, by_rate = spring_force(bodies, i, seen[k, GAP], seen[k, RATE])
+                residual[row + k - 1] = n[k] - wanted
+            for k in range(s):
+                grown += nodes.end_slope[k] * n[k]
+            residual[row + s - 1] = grown - step * (by_gap * end[RATE] + by_rate * end[BEND])
+        row += s
+        if state[i] == STICKING:
+            for k in range(1, s):
+                path = seen[k, TURNED] + bodies.rim_speed[i] * nodes.at[k] * step - fade[k, 1] * first[SLIP]
+                if not is_hard:
+                    for j in range(s):
+                        path -= step * nodes.integral[k, j] * seen[j, WIDENED]
+                residual[row + k - 1] = path
+            residual[row + s - 1] = step * (end[SLIP] - fade[s - 1, 3] * first[SLIP])
+            row += s
+        elif bodies.is_varied:
+            for k in range(s):
+                residual[row + k] = t[k] - state[i] * friction_ratio(bodies, i, seen[k, SLIP])[0] * n[k]
+            row += s
+    for c in range(n_closed):
+        first_row = solution.closed[c] * n_local
+        for k in range(1, s):
+            for a in range(n_local):
+                if a != TWIST:
+                    at = first_row + a
+                    residual[row] = solution.place[k, at] - solution.y[(k - 1) * n_row + at]
+                    row += 1
+
+
+@linked_sum
+def fill_slopes(bodies: Bodies, nodes: Nodes, state: Ints, force: Floats, n_closed: int, solution: Solution) -> None:
+    """Slopes of the laws, directions of the unknown forces and turning of the loads, at all nodes."""
+    s, n_local, n_row = nodes.at.size, bodies.n_local, bodies.load.shape[0]
+    for c in range(n_closed):
+        i = solution.closed[c]
+        first, is_bound = i * n_local, n_force(bodies, state[i]) == 1
+        for k in range(s):
+            row, is_last = i * s + k, k == s - 1
+            see_bend(bodies, row, solution)
+            normal, tangent, seen = solution.normal[row], solution.tangent[row], solution.seen[row]
+            of_normal, of_tangent = solution.normal_bend, solution.tangent_bend
+            n, t = force[i, NORMAL, k], force[i, FRICTION, k]
+            ratio = state[i] * bodies.friction[i] if is_bound else 0.0
+            for a in range(n_local):
+                solution.direction[row, NORMAL, a] = normal[a] + ratio * tangent[a]
+                solution.direction[row, FRICTION, a] = tangent[a]
+                for b in range(n_local):
+                    solution.turning[row, a, b] = n * of_normal[a, b] + t * of_tangent[a, b]
+            rates, v = (solution.start, n_row + first) if k == 0 else (solution.y, rate_row(s, n_row, k) + first)
+            bent = solution.bent[row]
+            for a in range(n_local):
+                of_rate, of_slip = 0.0, 0.0
+                for b in range(n_local):
+                    of_rate += of_normal[a, b] * rates[v + b]
+                    of_slip -= rates[v + b] * of_tangent[b, a]
+                bent[OF_RATE, a], bent[OF_SLIP, a], bent[OF_BEND, a] = of_rate, of_slip, 0.0
+            if bodies.is_varied and state[i] != STICKING:
+                solution.ratio[row, RATIO], solution.ratio[row, RATIO_SLOPE] = friction_ratio(bodies, i, seen[SLIP])
+            if bodies.normal_law[i] != HARD:
+                fill_spring_slopes(bodies, i, row, solution)
+                if is_last and bodies.damping[i] > 0.0:
+                    fill_bend_slope(bodies, i, row, v, bend_row(s, n_row) + first, solution)
+
+
+@linked_sum
+def fill_spring_slopes(bodies: Bodies, i: int, row: int, solution: Solution) -> None:
+    """Slopes of the law of a spring at a node."""
+    slope, gap, rate = solution.slope[row], solution.seen[row, GAP], solution.seen[row, RATE]
+    _, slope[BY_GAP], slope[BY_RATE] = spring_force(bodies, i, gap, rate)
+    slope[BY_GAP_TWICE], slope[BY_BOTH] = 0.0, 0.0
+    if bodies.normal_law[i] == HERTZ and gap != 0.0:
+        slope[BY_GAP_TWICE], slope[BY_BOTH] = 0.5 * slope[BY_GAP] / gap, 1.5 * slope[BY_RATE] / gap
+
+
+@linked_sum
+def fill_bend_slope(bodies: Bodies, i: int, row: int, v: int, at: int, solution: Solution) -> None:
+    """Slope of the acceleration of a gap in the local displacements, by differences of the curvature.
+
+    A displacement turns the normal and widens the reach, so that the curvature changes; all in one direction
+    at a time.
+    """
+    n_local, y, bent = bodies.n_local, solution.y, solution.bent[row]
+    normal, tangent, curvature = solution.normal[row], solution.tangent[row], solution.curvature[row]
+    along, across, squares = 0.0, 0.0, 0.0
+    for a in range(n_local):
+        along += normal[a] * y[v + a]
+        if a != TWIST:
+            across += tangent[a] * y[v + a]
+        if a > TWIST:
+            squares += y[v + a] * y[v + a]
+    n_along, n_across = solution.unit[row, 0], solution.unit[row, 1]
+    for a in range(n_local):
+        if a == TWIST:
+            continue
+        total = 0.0
+        for b in range(n_local):
+            total += solution.normal_bend[a, b] * y[at + b]
+        # Of curvature (t v)^2 + n_along sum(eta'^2): t turns against the normal, n_along by the tangent.
+        own = y[v + a] if a > TWIST else 0.0
+        turned = -curvature * along * tangent[a] - n_across * own
+        total += curvature * (2.0 * across * turned - curvature * across * across * normal[a])
+        total -= curvature * n_across * tangent[a] * squares
+        bent[OF_BEND, a] = total
+
+
+@linked_sum
+def change_pair(
+    bodies: Bodies, nodes: Nodes, i: int, first_node: int, begun: Floats, change: Floats, moved: Floats, solution: Solution
+) -> None:
+    """Fill `changed` with the change of what is seen of a pair, from a node on.
+
+    `begun` (3 R,) is the change of `start`, `change` (ny,) of y, `moved` (s, R) of `place`.
+    """
+    s, n_local, n_row = nodes.at.size, bodies.n_local, bodies.load.shape[0]
+    first = i * n_local
+    is_hard = bodies.normal_law[i] == HARD
+    for k in range(first_node, s):
+        row, is_last, changed = i * s + k, k == s - 1, solution.changed[k]
+        normal, tangent, seen, bent = solution.normal[row], solution.tangent[row], solution.seen[row], solution.bent[row]
+        gap = 0.0
+        for a in range(n_local):
+            gap += normal[a] * moved[k, first + a]
+        changed[GAP] = gap
+        rates, v = (begun, n_row + first) if k == 0 else (change, rate_row(s, n_row, k) + first)
+        twist = begun[first + TWIST] if k == 0 else change[(k - 1) * n_row + first + TWIST]
+        rate, across, turned, sideways = 0.0, 0.0, 0.0, 0.0
+        for a in range(n_local):
+            rate += normal[a] * rates[v + a] + bent[OF_RATE, a] * moved[k, first + a]
+            sideways -= bent[OF_SLIP, a] * moved[k, first + a]
+            if a != TWIST:
+                across += tangent[a] * rates[v + a]
+                turned += tangent[a] * moved[k, first + a]
+        across += sideways
+        if bodies.kind[i] == ROUND:
+            turned *= bodies.radius[i] * solution.curvature[row]
+        else:
+            turned = moved[k, first + ACROSS]
+        changed[RATE], changed[SLIP], changed[TURNED] = rate, rates[v + TWIST] - across, twist - turned
+        bow = solution.curvature[row]
+        widened = (1.0 - seen[GAP] * bow) * (seen[WIDENED] / seen[GAP] if seen[GAP] != 0.0 else 0.0)
+        changed[WIDENED] = widened * gap + seen[GAP] * bow * across
+        if is_last and not is_hard:
+            total, at = 0.0, bend_row(s, n_row) + first
+            for a in range(n_local):
+                total += normal[a] * change[at + a] + 2.0 * bent[OF_RATE, a] * rates[v + a]
+                total += bent[OF_BEND, a] * moved[k, first + a]
+            changed[BEND] = total
+
+
+@linked_sum
+def change_residual(
+    bodies: Bodies,
+    nodes: Nodes,
+    tables: Tables,
+    slot: int,
+    state: Ints,
+    force: Floats,
+    i: int,
+    pushed: Floats,
+    row: int,
+    target: Floats,
+    solution: Solution,
+) -> int:
+    """Fill the change of a pair's residuals, from `row` on in `target`; returns the row after them.
+
+    From what changes of the pair (`changed`), and of its forces, `pushed` (2, s).
+    """
+    s, fade, step = nodes.at.size, tables.fade[slot], tables.tick * 2.0 ** (tables.first_level + slot)
+    changed, n, slope = solution.changed, force[i, NORMAL], solution.slope
+    first, end, is_hard = changed[0], changed[s - 1], bodies.normal_law[i] == HARD
+    if is_hard:
+        for k in range(1, s):
+            target[row + k - 1] = changed[k, GAP] - fade[k, 0] * first[GAP] - fade[k, 1] * first[RATE]
+        rate = end[RATE] - fade[s - 1, 2] * first[GAP] - fade[s - 1, 3] * first[RATE]
+        target[row + s - 1] = step * rate
+    else:
+        grown = 0.0
+        for k in range(1, s):
+            by = slope[i * s + k]
+            target[row + k - 1] = pushed[NORMAL, k] - by[BY_GAP] * changed[k, GAP] - by[BY_RATE] * changed[k, RATE]
+        for k in range(s):
+            grown += nodes.end_slope[k] * pushed[NORMAL, k]
+        by, seen = slope[i * s + s - 1], solution.seen[i * s + s - 1]
+        grown -= step * (by[BY_GAP] * end[RATE] + by[BY_RATE] * end[BEND])
+        grown -= step * seen[RATE] * (by[BY_GAP_TWICE] * end[GAP] + by[BY_BOTH] * end[RATE])
+        target[row + s - 1] = grown - step * seen[BEND] * by[BY_BOTH] * end[GAP]
+    row += s
+    if state[i] == STICKING:
+        for k in range(1, s):
+            path = changed[k, TURNED] - first[TURNED] - fade[k, 1] * first[SLIP]
+            if not is_hard:
+                for j in range(s):
+                    path -= step * nodes.integral[k, j] * changed[j, WIDENED]
+            target[row + k - 1] = path
+        target[row + s - 1] = step * (end[SLIP] - fade[s - 1, 3] * first[SLIP])
+        row += s
+    elif bodies.is_varied:
+        for k in range(s):
+            ratio = solution.ratio[i * s + k]
+            grown = ratio[RATIO] * pushed[NORMAL, k] + n[k] * ratio[RATIO_SLOPE] * changed[k, SLIP]
+            target[row + k] = pushed[FRICTION, k] - state[i] * grown
+        row += s
+    return row
+
+
+@linked_sum
+def fill_column(
+    bodies: Bodies,
+    nodes: Nodes,
+    tables: Tables,
+    slot: int,
+    state: Ints,
+    force: Floats,
+    n_closed: int,
+    col: int,
+    n: int,
+    solution: Solution,
+) -> None:
+    """Fill a column of the matrix by the changes `change`, `moved` and `pushed` of one unknown."""
+    s, n_local, n_row = nodes.at.size, bodies.n_local, bodies.load.shape[0]
+    target, row = solution.residual, 0
+    for c in range(n_closed):
+        i = solution.closed[c]
+        change_pair(bodies, nodes, i, 1, solution.begun, solution.change, solution.moved, solution)
+        row = change_residual(
+            bodies, nodes, tables, slot, state, force, i, solution.pushed[i], row, target, solution
+        )
+    for c in range(n_closed):
+        first = solution.closed[c] * n_local
+        for k in range(1, s):
+            for a in range(n_local):
+                if a != TWIST:
+                    at = first + a
+                    target[row] = solution.moved[k, at] - solution.change[(k - 1) * n_row + at]
+                    row += 1
+    matrix = solution.matrix[slot]
+    for r in range(n):
+        matrix[r, col] = target[r]
+
+
+@linked_sum
+def fill_matrix(
+    bodies: Bodies,
+    nodes: Nodes,
+    tables: Tables,
+    slot: int,
+    state: Ints,
+    force: Floats,
+    n_closed: int,
+    n: int,
+    n_y: int,
+    solution: Solution,
+) -> bool:
+    """Make the matrix of the equations, and its factors; False where it is singular."""
+    s, n_local, n_row = nodes.at.size, bodies.n_local, bodies.load.shape[0]
+    forced, change, moved, pushed, col = tables.forced[slot], solution.change, solution.moved, solution.pushed, 0
+    fill_slopes(bodies, nodes, state, force, n_closed, solution)
+    for r in range(solution.begun.size):
+        solution.begun[r] = 0.0
+    for k in range(6):
+        solution.changed[0, k] = 0.0
+    for k in range(s):
+        for r in range(n_row):
+            moved[k, r] = 0.0
+    for i in range(pushed.shape[0]):
+        for k in range(s):
+            pushed[i, NORMAL, k], pushed[i, FRICTION, k] = 0.0, 0.0
+    for c in range(n_closed):
+        i = solution.closed[c]
+        for f in range(n_force(bodies, state[i])):
+            for k in range(s):
+                for r in range(n_y):
+                    change[r] = 0.0
+                for a in range(n_local):
+                    size, rows = solution.direction[i * s + k, f, a], forced[k * n_row + i * n_local + a]
+                    for r in range(n_y):
+                        change[r] += size * rows[r]
+                pushed[i, f, k] = 1.0
+                fill_column(bodies, nodes, tables, slot, state, force, n_closed, col, n, solution)
+                pushed[i, f, k] = 0.0
+                col += 1
+    for c in range(n_closed):
+        i = solution.closed[c]
+        for k in range(1, s):
+            for b in range(n_local):
+                if b == TWIST:
+                    continue
+                for r in range(n_y):
+                    change[r] = 0.0
+                for a in range(n_local):
+                    size, rows = solution.turning[i * s + k, a, b], forced[k * n_row + i * n_local + a]
+                    if size != 0.0:
+                        for r in range(n_y):
+                            change[r] += size * rows[r]
+                moved[k, i * n_local + b] = 1.0
+                fill_column(bodies, nodes, tables, slot, state, force, n_closed, col, n, solution)
+                moved[k, i * n_local + b] = 0.0
+                col += 1
+    return factorise(solution.matrix[slot], solution.pivot[slot], n)
+
+
+@linked_sum
+def noise_of(
+    bodies: Bodies, nodes: Nodes, slot: int, state: Ints, n_closed: int, n_pushed: int, n: int, solution: Solution
+) -> float:
+    """Largest force that the rounding of displacements causes, N."""
+    s, residual, size, row = nodes.at.size, solution.residual, 0.0, 0
+    for k in range(1, s):
+        for r in range(bodies.load.shape[0]):
+            size = max(size, abs(solution.place[k, r]))
+    for r in range(n):
+        residual[r] = 0.0
+    for c in range(n_closed):
+        i = solution.closed[c]
+        for f in range(n_force(bodies, state[i])):
+            if (f == NORMAL and bodies.normal_law[i] == HARD) or (f == FRICTION and state[i] == STICKING):
+                for k in range(s):
+                    residual[row + k] = ROUNDING * size * (1.0 if k % 2 == 0 else -1.0)
+            row += s
+    solve_factorised(solution.matrix[slot], solution.pivot[slot], n, residual)
+    noise = 0.0
+    for r in range(n_pushed):
+        noise = max(noise, abs(residual[r]))
+    return noise
+
+
+@linked_sum
+def code_of(state: Ints) -> int:
+    """States of the pairs as one number, not zero where a pair is closed."""
+    code = 0
+    for i in range(state.size):
+        code = code * 7 + state[i] + 2
+    return code
+
+
+@linked_sum
+def take_step(
+    bodies: Bodies,
+    nodes: Nodes,
+    tables: Tables,
+    slot: int,
+    x: Floats,
+    state: Ints,
+    force: Floats,
+    tolerance: float,
+    is_exact: bool,
+    solution: Solution,
+) -> int:
+    """Solve a step from the coordinates x: `force` (q, 2, s), a guess, becomes the solution.
+
+    Returns the number of iterations, negative where they do not converge. `tolerance` is that of forces, N.
+    Where `is_exact`, the matrix is that at the solution, for the tangent.
+    """
+    s, n_local, n_row = nodes.at.size, bodies.n_local, bodies.load.shape[0]
+    n_y = (2 * s - 1) * n_row
+    n_closed, n_pushed, n = list_closed(bodies, nodes, state, solution)
+    y_free, place, y, free = solution.y_free, solution.place, solution.y, tables.free[slot]
+    matrix, pivot, residual, load = solution.matrix[slot], solution.pivot[slot], solution.residual, solution.load
+    code = code_of(state)
+    if solution.states[slot] != code:
+        solution.states[slot] = 0
+    see_start(bodies, x, solution)
+    for r in range(n_y):
+        row, total = free[r], 0.0
+        for k in range(x.size):
+            total += row[k] * x[k]
+        y_free[r] = total
+    for a in range(load.size):
+        load[a] = 0.0
+    for r in range(n_row):
+        place[0, r] = solution.start[r]
+    for c in range(n_closed):  # loads as at the beginning, to find the first displacements
+        i = solution.closed[c]
+        for k in range(s):
+            see_gap(bodies, i, place[0], i * n_local, i * s + k, solution)
+    push_closed(bodies, nodes, state, force, n_closed, solution)
+    respond(tables, slot, n_row, n_local, n_closed, n_y, solution)
+    for c in range(n_closed):
+        first = solution.closed[c] * n_local
+        for k in range(1, s):
+            for a in range(first, first + n_local):
+                place[k, a] = y[(k - 1) * n_row + a]
+    last, largest, iteration, is_solved, is_fresh = np.inf, 0.0, 0, False, False
+    while iteration < MOST_ITERATIONS:
+        iteration += 1
+        for c in range(n_closed):
+            i = solution.closed[c]
+            for k in range(1, s):
+                see_gap(bodies, i, place[k], i * n_local, i * s + k, solution)
+        push_closed(bodies, nodes, state, force, n_closed, solution)
+        respond(tables, slot, n_row, n_local, n_closed, n_y, solution)
+        if is_solved and not is_exact:
+            return iteration
+        fill_residual(bodies, nodes, tables, slot, state, force, n_closed, solution)
+        if solution.states[slot] == 0 or is_solved:
+            if not fill_matrix(
+                bodies, nodes, tables, slot, state, force, n_closed, n, n_y, solution
+            ):
+                solution.states[slot] = 0
+                return -iteration
+            solution.states[slot], is_fresh = code, True
+            solution.noise[slot] = noise_of(bodies, nodes, slot, state, n_closed, n_pushed, n, solution)
+            if is_solved:
+                return iteration
+            fill_residual(bodies, nodes, tables, slot, state, force, n_closed, solution)
+        solve_factorised(matrix, pivot, n, residual)
+        change, largest, row = 0.0, 0.0, 0
+        for r in range(n_pushed):
+            change = max(change, abs(residual[r]))
+        if not change < 1e200:
+            solution.states[slot] = 0
+            return -iteration
+        for c in range(n_closed):
+            i = solution.closed[c]
+            for f in range(n_force(bodies, state[i])):
+                for k in range(s):
+                    force[i, f, k] -= residual[row + k]
+                    if f == NORMAL:
+                        largest = max(largest, abs(force[i, f, k]))
+                row += s
+        for c in range(n_closed):
+            first = solution.closed[c] * n_local
+            for k in range(1, s):
+                for a in range(n_local):
+                    if a != TWIST:
+                        place[k, first + a] -= residual[row]
+                        row += 1
+        floor = max(tolerance, solution.noise[slot])
+        if change <= floor or (iteration > 1 and change * min(1.0, change / last) <= tolerance):
+            is_solved = True
+        elif iteration > 3 and change > 0.1 * last and (change < 1e-7 * largest or change < 30.0 * floor):
+            is_solved = True  # rounding: no further progress
+        elif iteration > 1 and change > SLOW * last and (not is_fresh or iteration > 2):
+            solution.states[slot] = 0
+        last, is_fresh = change, False
+    solution.states[slot] = 0
+    return -iteration
