@@ -131,6 +131,7 @@ class CollocationMarch(ModalMarch):
             turn=zeros(modes.exponent.size, dtype=complex),
             impulse=zeros((q, 2)),
             speed=zeros((q, 2)),
+            count=zeros(8, dtype=np.int64),
         )
 
     def _new_seen(self, samples: Samples, accumulator: Accumulator) -> Seen:

@@ -96,7 +96,7 @@ def fill_events(
                 solution.seen[row, GAP], solution.seen[row, RATE] = solution.gap[row], rate
                 event[i, NORMAL, k] = solution.gap[row]
                 if bodies.normal_law[i] == PENALTY:
-                    event[i, NORMAL, k] += bodies.damping[i] / bodies.stiffness[i] * min(rate, 0.0)
+                    event[i, NORMAL, k] += bodies.damping[i] / bodies.stiffness[i] * max(rate, 0.0)
                 continue
             if bodies.normal_law[i] == HARD:
                 event[i, NORMAL, k] = force[i, NORMAL, k]

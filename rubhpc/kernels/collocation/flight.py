@@ -89,25 +89,25 @@ def fly(
                     rate += slope * start[n_row + first + a]
                     bound += abs(slope) * total
             soft = bodies.damping[i] / bodies.stiffness[i] if bodies.normal_law[i] == PENALTY else 0.0
-            near = gap + soft * min(rate, 0.0)
+            near = gap + soft * max(rate, 0.0)
             least = math.sqrt(2.0 * GAP_TOLERANCE / bound)
             age = (tick - case.since[i]) * tick_length
             if age < RECENT * case.lasting[i]:
                 least = max(least, RARELY * age)
             is_close = False
-            if rate < 0.0 and near < -rate * tick_length:
-                back = -int(near / (rate * tick_length)) if near < 0.0 and soft == 0.0 else 0
+            if (rate < 0.0 and gap < -rate * tick_length) or (near < 0.0 and soft > 0.0):
+                back = -int(gap / (rate * tick_length)) if gap < 0.0 and rate < 0.0 else 0
                 back = max(back, begun - tick)
                 if back == 0:
                     return tick, i, bound, n_look
                 ahead, is_exact = back, True
                 break
-            if near <= 0.0:  # closed as yet, and opening: while the rate surely stays positive
+            if gap <= 0.0:  # closed as yet, and opening: while the rate surely stays positive
                 free = max(least, rate / bound)
             else:
-                root = math.sqrt(rate * rate + 2.0 * bound * near)
-                free = (root + rate) / bound if rate > 0.0 else 2.0 * near / (root - rate)
-                is_close = rate < 0.0 and bound * near < 0.5 * rate * rate
+                root = math.sqrt(rate * rate + 2.0 * bound * gap)
+                free = (root + rate) / bound if rate > 0.0 else 2.0 * gap / (root - rate)
+                is_close = rate < 0.0 and bound * gap < 0.5 * rate * rate
                 if not is_close:
                     free = max(least, free)
             ticks = max(1, int(min(free / tick_length, 1.0 * ahead)))

@@ -56,6 +56,7 @@ Complexes = NDArray[np.complex128]
 Ints = NDArray[np.int64]
 
 STEPPING, TRYING, SETTLING = range(3)  # what is to be done next while a pair is closed
+ALLOWED = 3.0  # error of the forces of a step over the accuracy
 NEWTON = 0.03  # tolerance of the forces in Newton's method, over that of the steps
 AVERAGED = 20e-6  # s: an error of the force in a shorter step counts as the error of its impulse over that time
 BEGINNING = 1.0 / 125.0  # first step of a contact over the last contact of the pair
@@ -327,6 +328,7 @@ def advance_by_collocation(
             )
             memory.unseen = 0
             progress.n_step += n_look
+            solution.count[2] += n_look
             if is_recorded:
                 record_flight(bodies, signals, power, clock, begun, tick, x, progress, seen)
             progress.tick, kind = tick, NORMAL
@@ -366,6 +368,7 @@ def advance_by_collocation(
                 bodies, nodes, tables, slot, x, state, solution.guess, NEWTON * accuracy * memory.scale, False, solution
             )
             progress.n_step += 1
+            solution.count[3] += 1
             if todo == TRYING:
                 solution.waiting[trial] = False
                 if n_iteration < 0:
@@ -402,7 +405,8 @@ def advance_by_collocation(
                     if state[i] != OPEN:
                         for k in range(s):
                             largest = max(largest, abs(solution.guess[i, NORMAL, k]))
-            if n_iteration < 0 or error > accuracy * largest:
+            if n_iteration < 0 or error > ALLOWED * accuracy * largest:
+                solution.count[4] += 1
                 if slot > 0:
                     memory.slot = slot - 1
                     if n_iteration < 0:
@@ -444,6 +448,7 @@ def advance_by_collocation(
                 if taken == whole:
                     end_of_step(bodies, tables, slot, x, solution.load, after)
                 else:
+                    solution.count[5] += 1
                     within_step(bodies, nodes, step, taken / whole, x, solution.load, solution.turn, after)
                 for k in range(n_x):
                     x[k] = after[k]
@@ -451,7 +456,7 @@ def advance_by_collocation(
                 case.force[:] = solution.guess
                 memory.scale, memory.length, memory.part = max(LEAST_SCALE, 0.999 * largest), whole, taken / whole
                 memory.slot = slot
-                if taken == whole and error < accuracy * largest / GROWING and slot < top:
+                if taken == whole and error < ALLOWED * accuracy * largest / GROWING and slot < top:
                     memory.slot = slot + 1
             if pair < 0:
                 if is_diverged(bodies, x):

@@ -604,6 +604,7 @@ def take_step(
     last, largest, iteration, is_solved, is_fresh = np.inf, 0.0, 0, False, False
     while iteration < MOST_ITERATIONS:
         iteration += 1
+        solution.count[1] += 1
         for c in range(n_closed):
             i = solution.closed[c]
             for k in range(1, s):
@@ -614,6 +615,7 @@ def take_step(
             return iteration
         fill_residual(bodies, nodes, tables, slot, state, force, n_closed, solution)
         if solution.states[slot] == 0 or is_solved:
+            solution.count[0] += 1
             if not fill_matrix(
                 bodies, nodes, tables, slot, state, force, n_closed, n, n_y, solution
             ):

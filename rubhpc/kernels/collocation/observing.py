@@ -390,8 +390,10 @@ def record_contact(
         before, first = after, at
     if state[i] == STICKING:
         accumulator.stick_time[i] += length
-    else:
-        observe_sense(i, FORWARD if state[i] == FORWARD else BACKWARD, accumulator)
+    for k in range(s):
+        slip = solution.seen[i * s + k, SLIP]
+        if state[i] != STICKING and nodes.at[k] <= share and slip != 0.0:
+            observe_sense(i, FORWARD if slip > 0.0 else BACKWARD, accumulator)
     drive = bodies.rim_speed[i] * step * integral_of(nodes, t, 0.0, share)
     worked = 0.0
     for k in range(s):

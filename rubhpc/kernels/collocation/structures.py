@@ -138,6 +138,7 @@ class Solution(Struct):
     turn: Complexes  # (nm,)
     impulse: Floats  # (q, 2)
     speed: Floats  # (q, 2), gap rate and slip before an impact
+    count: Ints
 
 
 class CaseState(Struct):
