@@ -41,7 +41,7 @@ HAS_VALUES = (DONE, INFERRED)  # measures and regime, as a reader of the store s
 REGIME = ("no_contact", "periodic", "quasi_periodic", "chaotic", "undecided")
 BRANCH_EVENT = ("none", "fold", "period_doubling", "neimark_sacker", "grazing", "end", "branch_point")
 SETTLED = ("not_settled", "settled")
-SCHEMES = ("event_driven", "contact_stepping", "central_difference", "curved")
+SCHEMES = ("event_driven", "contact_stepping", "central_difference", "curved", "collocation")
 
 # The recorded signals: name, extra dimensions, unit, long name; in single precision, as are their spectra.
 _SIGNALS = (

@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from rubhpc.integrate.compilation import (
+    COLLOCATION,
     COMMON,
-    CURVED,
     NEIGHBOURS,
     PERIODIC,
     RUN_UPS,
-    STEPS,
     STICK,
     seconds_compiling,
 )
@@ -24,8 +23,7 @@ from rubhpc.integrate.lyapunov import Growth, Marches
 from rubhpc.integrate.marched_record import Marched, march_record, repeat_period
 from rubhpc.integrate.marches.central_difference import CentralDifferenceMarch
 from rubhpc.integrate.marches.closed_form import closed_form_march
-from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
-from rubhpc.integrate.marches.curved import CurvedMarch
+from rubhpc.integrate.marches.collocation import CollocationMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.measuring.divergence import diverged_record
@@ -78,8 +76,7 @@ if TYPE_CHECKING:
 
 MARCHES: dict[Scheme, Callable[..., March]] = {
     Scheme.EVENT_DRIVEN: EventDrivenMarch,
-    Scheme.CURVED: CurvedMarch,
-    Scheme.CONTACT_STEPPING: ContactSteppingMarch,
+    Scheme.COLLOCATION: CollocationMarch,
     Scheme.CENTRAL_DIFFERENCE: CentralDifferenceMarch,
 }
 
@@ -148,8 +145,8 @@ def run_case(
     try:
         record = _integrate(starter(scheme), state, setup, clearance, friction, recording)
     except NoClosedForm:
-        # Contacts that chatter, or too many sets of them: short steps need no events.
-        scheme = Scheme.CONTACT_STEPPING
+        # Contacts that chatter, or too many sets of them.
+        scheme = Scheme.COLLOCATION
         record = _integrate(starter(scheme), state, setup, clearance, friction, recording)
         record.measures["left_closed_form"] = 1
     record.measures["scheme"] = scheme.flag
@@ -174,10 +171,8 @@ def kernel_sets(setup: Setup, *, changes_speed: bool = False) -> set[str]:
     if not isinstance(setup, ModalSetup):
         return {COMMON}
     sets = {COMMON, RUN_UPS} if changes_speed else {COMMON, NEIGHBOURS}
-    if setup.scheme is Scheme.CONTACT_STEPPING:
-        return sets | {STEPS}
-    if setup.scheme is Scheme.CURVED:
-        return sets | {CURVED}
+    if setup.scheme is Scheme.COLLOCATION:
+        return sets | {COLLOCATION}
     return sets | {PERIODIC} | ({STICK} if plain(is_set_valued)(setup.law) else set())
 
 

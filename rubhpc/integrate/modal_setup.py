@@ -17,7 +17,6 @@ from rubhpc.integrate.reduced_model.contact_mode import (
     confine,
     solve_contact_mode,
 )
-from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
 from rubhpc.integrate.reduced_model.flight_modes import FlightModes
 from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs, solve_friction_mode
 from rubhpc.integrate.reduced_model.mode_library import (
@@ -51,7 +50,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-Kind = Literal["sliding", "curved", "penalty", "friction"]  # of contact modes
+Kind = Literal["sliding", "penalty", "friction"]  # of contact modes
 FINEST_TICK = 1.9e-10  # s
 CONTACT_STEPS = 1024  # per revolution, at least, while recording a contact
 LONGEST_TURN = FINEST_TICK * 2**46  # s, 3.7 hours: 64 bits count the ticks of a hundred thousand revolutions
@@ -160,7 +159,15 @@ class ModalSetup:
     @cached_property
     def flight_modes(self) -> FlightModes:
         """What the collocation integrator takes of the set-up."""
-        return FlightModes(self)
+        mode = self._opened
+        m = mode.n_eigenmode
+        exponent, motion, enter = mode.exponent[:m], mode.motion[:, :m].copy(), mode.enter.copy()
+        for k in np.flatnonzero(exponent.imag == 0.0):  # real but for a factor
+            factor = motion[np.abs(motion[:, k]).argmax(), k]
+            motion[:, k], enter[k] = (motion[:, k] / factor).real, (enter[k] * factor).real
+        return FlightModes(
+            self, exponent, motion, enter, exponent.imag != 0.0, 1j * self.spin, mode.motion[:, m]
+        )
 
     @cached_property
     def n_level(self) -> int:
@@ -171,10 +178,6 @@ class ModalSetup:
     def library(self, friction: float) -> ModeLibrary:
         """Contact modes of a friction, shared by its cases."""
         return self._find("sliding", friction)
-
-    def curved_library(self, friction: float) -> ModeLibrary:
-        """The same with tables for curved gaps."""
-        return self._find("curved", friction)
 
     def penalty_library(self, friction: float) -> ModeLibrary:
         """The same under a penalty."""
@@ -192,7 +195,7 @@ class ModalSetup:
                 known = self._known
                 opened = solve_friction_mode(self.reduced, pairs, 0, known)
                 among = open_bodies(self.reduced, self.model, opened)
-            self._libraries[kind, friction] = (CurvedLibrary if kind == "curved" else ModeLibrary)(
+            self._libraries[kind, friction] = ModeLibrary(
                 self.reduced,
                 self.model,
                 friction,

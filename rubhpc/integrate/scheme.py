@@ -7,7 +7,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from rubhpc.schema import SCHEMES
-from rubhpc.study.tables import check_bent
 
 if TYPE_CHECKING:
     from rubhpc.study.study import Contact, Integrator
@@ -17,8 +16,7 @@ class Scheme(Enum):
     """Integration scheme of a case."""
 
     EVENT_DRIVEN = "event-driven"  # closed-form motion from event to event
-    CURVED = "curved"  # closed-form flights from event to event, steps of order 8 where gaps are closed
-    CONTACT_STEPPING = "contact-stepping"  # closed-form motion between short steps of contact
+    COLLOCATION = "collocation"  # closed-form flights, contact forces as polynomials on nodes
     CENTRAL_DIFFERENCE = "central-difference"  # the paper's
 
     @cached_property
@@ -35,10 +33,7 @@ def scheme_of(contact: Contact, integrator: Integrator, *, is_bent: bool = False
     InputError
         For a bent stator with laws or an integrator that have none.
     """
-    if is_bent:
-        check_bent(contact, integrator)
     if integrator.method == "central-difference":
         return Scheme.CENTRAL_DIFFERENCE
-    if contact.is_smooth and (is_bent or contact.normal == "updated"):
-        return Scheme.CURVED
-    return Scheme.CONTACT_STEPPING if contact.closed_form == "never" else Scheme.EVENT_DRIVEN
+    is_general = is_bent or contact.normal == "updated" or contact.closed_form == "never"
+    return Scheme.COLLOCATION if is_general else Scheme.EVENT_DRIVEN

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.integrate.case import march_of
-from rubhpc.integrate.changing_speed.piece_setup import with_values
 from rubhpc.integrate.changing_speed.range_library import RangeLibrary
-from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
+from rubhpc.integrate.marches.collocation import CollocationMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.marches.modal import ModalMarch, Place
@@ -116,7 +115,7 @@ def begin_stretch(
 ) -> RangeLibrary | None:
     """Begin a piece, to be continued in the same kernel call; None where it must be integrated alone.
 
-    It has begun either way, but where the march is none that takes several (`has_piece_loop`). `left` is
+    It has begun either way. `left` is
     where the piece before has ended (`EventDrivenMarch.reached_in`), of modes that follow the speed, `since`
     the time from its middle to that of this one, s.
     """
@@ -244,7 +243,7 @@ class Passing:
     ) -> None:
         self._case = clearance, friction
         self._check, self._say = check, say
-        self._march: EventDrivenMarch | None = None
+        self._march: EventDrivenMarch | CollocationMarch | None = None
         self.left: tuple[int, Floats] | None = None  # end of the last piece, in modal coordinates
         self._lasted = 0.0  # s, duration of that piece
         self._room: dict[int, Samples] = {}  # by number of samples of a piece
@@ -274,10 +273,9 @@ class Passing:
                 if march.has_lost_events(passed.n_step, lasts, march.motion(), closed):
                     raise NoClosedForm
             return passed
-        except NoClosedForm:  # chattering contacts: short steps need no events
+        except NoClosedForm:  # contacts that chatter, or too many sets of them
             self._march = None
-            even = evenly_forced(setup, n_sample)
-            steps = ContactSteppingMarch(even, *self._case, state_at(begun, setup), self._check)
+            steps = CollocationMarch(setup, *self._case, state_at(begun, setup), self._check)
             return self._pass(steps, setup, n_sample, earlier, is_balanced)
 
     def _look(self, setup: PieceSetup) -> None:
@@ -291,13 +289,10 @@ class Passing:
     ) -> bool:
         """Whether fast modes go on from a piece before, of another range or acceleration, into the next one.
 
-        `jump` (rad/s^2) is a sudden change of the acceleration. The height of a curved gap depends on the
-        motion, which must not change while the gap is closed.
+        `jump` (rad/s^2) is a sudden change of the acceleration.
         """
         march = self._march
-        if march is None or before is None or not isinstance(begun, Place):
-            return False
-        if not march.has_closed_form and (begun.contact_force > 0.0).any():
+        if not isinstance(march, EventDrivenMarch) or before is None or not isinstance(begun, Place):
             return False
         if not (before.setup.held.is_followed and setup.held.is_followed):
             return False
@@ -312,7 +307,7 @@ class Passing:
 
     def ended(self, setup: PieceSetup, n_sample: int, acceleration: float) -> Ended | None:
         """End of the last piece in its own modes, if it has any; its acceleration is in rad/s^2."""
-        library = None if self._march is None else self._march.library
+        library = self._march.library if isinstance(self._march, EventDrivenMarch) else None
         if self.left is None or not isinstance(library, RangeLibrary):
             return None
         mask, z = self.left
@@ -339,7 +334,7 @@ class Passing:
         goes_on: bool = False,
     ) -> Stretch | None:
         """Integrate pieces with the same matrices from `first` on, as many as possible; None for none."""
-        if self._march is None or not isinstance(begun, Place):
+        if not isinstance(self._march, EventDrivenMarch) or not isinstance(begun, Place):
             return None
         if self._check is not None:
             self._check()
@@ -351,7 +346,7 @@ class Passing:
         except NoClosedForm:
             return None
         if library is None:
-            self._at = setup if march.has_piece_loop else None
+            self._at = setup
             return None
 
         def look(piece: int) -> None:
@@ -373,21 +368,16 @@ class Passing:
             if at is setup:
                 return march
             march.begin(setup, begun)
-            if goes_on:
-                self._keep_fast(march, setup, n_sample)
-            return march
-        kind = march_of(setup.scheme, setup)
-        is_stepped = kind is ContactSteppingMarch
-        taken = evenly_forced(setup, n_sample) if is_stepped else setup
-        made = kind(taken, *self._case, state_at(begun, setup), self._check)
-        assert isinstance(made, ModalMarch)
-        if isinstance(made, EventDrivenMarch):
-            self._march = made
-            if goes_on:
-                mask, z = made.reached_in()
+        else:
+            made = march_of(setup.scheme, setup)(setup, *self._case, state_at(begun, setup), self._check)
+            assert isinstance(made, EventDrivenMarch | CollocationMarch)
+            self._march = march = made
+            if goes_on and isinstance(march, EventDrivenMarch):
+                mask, z = march.reached_in()
                 self.left = mask, np.zeros_like(z)
-                self._keep_fast(made, setup, n_sample)
-        return made
+        if goes_on and isinstance(march, EventDrivenMarch):
+            self._keep_fast(march, setup, n_sample)
+        return march
 
     def _keep_fast(self, march: EventDrivenMarch, setup: PieceSetup, n_sample: int) -> None:
         """Let fast modes that follow the speed continue unchanged."""
@@ -426,18 +416,6 @@ class Passing:
         if n_sample not in self._room:
             self._room[n_sample] = empty_samples(model.n_place, n_sample, model.n_probe)
         return self._room[n_sample]
-
-
-def evenly_forced(setup: PieceSetup, n_sample: int) -> PieceSetup:
-    """The set-up of a piece with a constant unbalance force, that of its middle, for short steps."""
-    growth = setup.clock.growth
-    grown = math.exp(0.5 * growth * setup.interval * n_sample)
-    return with_values(
-        setup,
-        clock=setup.clock._replace(growth=0.0),
-        reduced=with_values(setup.reduced, force=grown * setup.reduced.force),
-        _open_tables={},
-    )
 
 
 def state_at(begun: State | Place, setup: PieceSetup) -> State:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -11,13 +11,13 @@ import numpy as np
 from rubhpc.fem.probes import probes_at, seen_at_rest
 from rubhpc.fem.statics import at_rest_under
 from rubhpc.integrate.changing_speed.mode_courses import between
-from rubhpc.integrate.changing_speed.range_curved import RangeCurvedLibrary
 from rubhpc.integrate.changing_speed.range_library import AT_ONCE, RangeLibrary, TableBuffer
 from rubhpc.integrate.modal_setup import Kind, ModalSetup
+from rubhpc.integrate.reduced_model.flight_modes import FlightModes
 from rubhpc.integrate.reduced_model.system_modes import KeptParts
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
@@ -63,7 +63,6 @@ class HeldMatrices:
     ) -> None:
         self._buffers, self._beside = buffers, beside
         self.model, self.reduced = model, reduced
-        self.at_hand = reduced  # at the speed of the current piece
         self.twist = self.lean = np.zeros(model.sag.size)  # sag under 1 N m of a drive; under 1 rad/s^2
         self.slope = np.zeros(model.sag.size)  # change of the sag with the speed
         self.sagging_models: list[Model] = []  # at `mode_courses.NODES`, where the sag depends on the speed
@@ -143,14 +142,10 @@ class HeldMatrices:
 
     def tuned(self, kind: Kind, piece: PieceSetup, friction: float) -> RangeLibrary:
         """Contact modes of a friction, tuned to a piece and valid until another one requests them."""
-        self.at_hand = piece.reduced
         if (kind, friction) not in self._libraries:
             if any(known != friction for _, known in self._libraries):  # of earlier cases
                 self._libraries.clear()
-            made: Callable[..., RangeLibrary] = RangeLibrary
-            if kind == "curved":
-                made = partial(RangeCurvedLibrary, at_piece=lambda: self.at_hand)
-            self._libraries[kind, friction] = made(
+            self._libraries[kind, friction] = RangeLibrary(
                 self.reduced,
                 self.model,
                 friction,
@@ -233,6 +228,30 @@ class PieceSetup(ModalSetup):
         if not self.held.is_followed or made.spring:
             return made.overlap
         return max(made.overlap, float(self.accuracy * np.abs(clearance[: len(self.model.stators)]).min()))
+
+    @property
+    def flight_modes(self) -> FlightModes:
+        """What the collocation integrator takes of the piece: modes at its speed."""
+        found: FlightModes | None = vars(self).get("_flight_modes")
+        if found is None or found.setup is not self:
+            found = vars(self)["_flight_modes"] = self._solve_flight()
+        return found
+
+    def _solve_flight(self) -> FlightModes:
+        library = self.held.tuned("sliding", self, 0.0)
+        modes = library.eigenmodes(0, min(max(self.within, -1.0), 1.0))
+        assert modes is not None
+        turning, factor = complex(self.clock.growth, self.spin), complex(self.speeds.factor[self.place])
+        response = modes.response(turning, factor)
+        return FlightModes(
+            self,
+            modes.exponent,
+            modes.motion,
+            modes.enter,
+            np.ones(modes.exponent.size, bool),
+            turning,
+            response,
+        )
 
     def _find(self, kind: Kind, friction: float) -> ModeLibrary:
         return self.held.tuned(kind, self, friction)

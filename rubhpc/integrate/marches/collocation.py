@@ -8,8 +8,8 @@ import numpy as np
 
 from rubhpc.integrate.marches.march import ALL_SAMPLES, NO_FORCES
 from rubhpc.integrate.marches.modal import ModalMarch
-from rubhpc.integrate.reduced_model.flight_modes import FlightModes
-from rubhpc.kernels.collocation.march import advance_by_collocation
+from rubhpc.kernels.case_progress import LONG_AGO, follow, shaft_turn
+from rubhpc.kernels.collocation.march import LEAST_SCALE, advance_by_collocation
 from rubhpc.kernels.collocation.observing import Seen
 from rubhpc.kernels.collocation.structures import FORWARD, NORMAL, OPEN, CaseState, Solution, new_memory
 from rubhpc.kernels.sampling import Measured
@@ -19,9 +19,12 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rubhpc.integrate.marches.modal import Place
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.record import State
     from rubhpc.kernels.accumulators import Accumulator, Samples
+    from rubhpc.kernels.case_progress import Clock, Progress
+    from rubhpc.kernels.sampling import Recorder
 
     Floats = NDArray[np.float64]
 
@@ -39,27 +42,57 @@ class CollocationMarch(ModalMarch):
     ) -> None:
         """Start from `initial`, with the contacts closed that its forces press."""
         super().__init__(setup, clearance, friction, initial, check)
-        self._modes: FlightModes = setup.flight_modes
-        self._contacts = self._modes.bodies(friction, self._clearance)
-        self._solution = self._new_solution()
+        self._friction = friction
         self._seen: Seen | None = None
+        self._solution: Solution | None = None
+        self._use_modes(setup)
         self._begin(initial.contact_force)
 
-    def _begin(self, contact_force: Floats) -> None:
-        modes, s = self._modes, self._modes.nodes.at.size
-        q = self._clearance.size
+    def _use_modes(self, setup: ModalSetup) -> None:
+        """Take the modes of a set-up."""
+        self._modes = setup.flight_modes
+        self._contacts = self._modes.bodies(self._friction, self._clearance)
+        sizes = self._modes.tables.free.shape, self._modes.n_local
+        if self._solution is None or sizes != self._sizes:
+            self._sizes, self._solution, self._seen = sizes, self._new_solution(), None
+
+    def _begin(self, contact_force: Floats, turn: tuple[float, float] = (1.0, 0.0)) -> None:
+        """Begin with the motion, at the shaft's `turn`; the contacts that forces (q,), N, press are closed."""
+        modes, s, q = self._modes, self._modes.nodes.at.size, self._clearance.size
         self._memory = new_memory()
         self._case = CaseState(
-            x=modes.coordinates(self._motion),
+            x=modes.coordinates(self._motion, *turn),
             state=np.where(contact_force > 0.0, FORWARD, OPEN),
             force=np.zeros((q, 2, s)),
             lasting=np.zeros(q),
             since=np.zeros(q, dtype=np.int64),
         )
         self._case.force[:, NORMAL] = contact_force[:, None]
-        self._memory["event_tick"] = -(2**61)
-        self._memory["scale"] = max(1e-3, float(contact_force.max(initial=0.0)))
+        self._memory["event_tick"], self._memory["is_new"] = LONG_AGO, 1
+        self._memory["scale"] = max(LEAST_SCALE, float(contact_force.max(initial=0.0)))
         self._solution.states[:] = 0
+
+    def begin(self, setup: ModalSetup, place: Place) -> None:
+        """Begin anew at another speed in the same reduced coordinates, from where a march has come.
+
+        Contacts keep their states.
+        """
+        self.n_step, self.sample, self._stride = 0, 0, ALL_SAMPLES
+        tick, state, memory = int(self.progress.tick), self._case.state.copy(), self._memory.copy()
+        force, lasting, age = (
+            self._case.force,
+            self._case.lasting,
+            (tick - self._case.since) * self.clock.tick,
+        )
+        self._take(setup)
+        self._motion[:] = self.moved(setup, place)
+        self._use_modes(setup)
+        self._begin(place.contact_force)
+        self._case.state[:], self._case.force[:], self._case.lasting[:] = state, force, lasting
+        self._case.since[:] = -np.round(age / self.clock.tick).astype(np.int64)
+        self._memory["is_new"] = 0
+        for name in ("slot", "scale", "fastest", "unseen"):
+            self._memory[name] = memory[name]
 
     def start_again(self, state: State) -> bool:
         """Restart the same case at another state."""
@@ -68,6 +101,27 @@ class CollocationMarch(ModalMarch):
         self._motion[:] = self.reduced(state)
         self._begin(state.contact_force)
         return True
+
+    def take_over(
+        self,
+        clock: Clock,
+        progress: Progress,
+        recorder: Recorder,
+        motion: Floats,
+        closed: NDArray[np.bool_],
+    ) -> None:
+        """Begin at the tick of another march with its motion (2 n,) and closed pairs (q,); continue its record."""
+        self.clock, self._recorder = clock, recorder
+        follow(self.progress, progress)
+        self._motion[:] = motion
+        self._begin(closed.astype(float), shaft_turn(clock, self.progress.tick))
+
+    def advance_to(
+        self, last_tick: int, clock: Clock, samples: Samples, accumulator: Accumulator, is_recorded: bool
+    ) -> int:
+        """Advance to a tick for another march; returns an outcome of `kernels.case_progress`."""
+        self.clock = clock
+        return self._kernel(last_tick, samples, accumulator, is_recorded)
 
     def motion(self) -> Floats:
         """Reduced displacements, then velocities (2 n,), at the sample reached."""
@@ -125,13 +179,13 @@ class CollocationMarch(ModalMarch):
             instant=zeros((q, 2)),
             touching=zeros(q, dtype=np.bool_),
             kept=zeros(q, dtype=np.bool_),
+            bound=zeros(q, dtype=np.bool_),
             waiting=zeros(q, dtype=np.bool_),
             event=zeros((q, 2, s)),
             after=zeros(n_x),
             turn=zeros(modes.exponent.size, dtype=complex),
             impulse=zeros((q, 2)),
             speed=zeros((q, 2)),
-            count=zeros(8, dtype=np.int64),
         )
 
     def _new_seen(self, samples: Samples, accumulator: Accumulator) -> Seen:

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.fem.statics import sag_at_stators
 from rubhpc.integrate.marches.contact_sets import ContactSets
 from rubhpc.integrate.marches.march import ALL_SAMPLES
 from rubhpc.integrate.marches.met_modes import MetModes, NoClosedForm
@@ -43,7 +42,6 @@ class EventDrivenMarch(ContactSets):
     """A case that goes from one contact mode to another; `NoClosedForm` leaves it to contact stepping."""
 
     has_closed_form = True  # of its closed contacts
-    has_piece_loop = True  # whether a kernel begins pieces of a changing speed
 
     def __init__(
         self,
@@ -63,17 +61,8 @@ class EventDrivenMarch(ContactSets):
         """Begin anew at another speed in the same reduced coordinates, from where a march has come."""
         self.n_step, self.sample, self._stride = 0, 0, ALL_SAMPLES
         self._take(setup)
-        self._motion[:] = place.motion
-        if place.sag is not setup.model.sag and (moved := place.sag - setup.model.sag).any():
-            n = self.bodies.stiffness.shape[0]
-            self._motion[:n] += setup.reduced.project[:, : moved.size] @ moved
+        self._motion[:] = self.moved(setup, place)
         self._enter_first(place.contact_force)
-
-    def gaps(self, setup: ModalSetup, place: Place) -> Floats:
-        """Gaps (q,), m, of a motion about the sag of a set-up in place of its own."""
-        displacement = place.motion[: self.bodies.stiffness.shape[0]]
-        open_: Floats = self._at_rest - sag_at_stators(setup.model)[0]
-        return open_ + self.bodies.gap_jacobian @ displacement
 
     def reached_in(self) -> tuple[int, Floats]:
         """Set of contacts in which the case stands, and a copy of its modal coordinates (2, m)."""
@@ -132,10 +121,8 @@ class EventDrivenMarch(ContactSets):
         self.find(mask)
         self._start(self.library.masks.index(mask))
 
-    def begin_tuned(self, setup: ModalSetup, place: Place) -> ModeLibrary | None:
-        """Begin where a kernel takes piece after piece; None where pieces are begun one by one."""
-        if not self.has_piece_loop:
-            return None
+    def begin_tuned(self, setup: ModalSetup, place: Place) -> ModeLibrary:
+        """Begin where a kernel takes piece after piece."""
         self.begin(setup, place)
         return self.library
 

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
+from rubhpc.integrate.marches.collocation import CollocationMarch
+from rubhpc.integrate.marches.interlude import Interlude
 from rubhpc.integrate.marches.march import NO_FORCES
 from rubhpc.integrate.marches.met_modes import NoClosedForm
-from rubhpc.integrate.marches.short_steps import ShortSteps
 from rubhpc.integrate.marches.state_sets import StateSets
 from rubhpc.integrate.measuring.samples import new_accumulator, stacked_accumulators
 from rubhpc.integrate.record import State
@@ -48,8 +48,8 @@ _NO_SUMS = stacked_accumulators(0, _NO_RECORD)
 class FrictionMarch(StateSets):
     """A case whose pairs open, slide in either sense and stick.
 
-    Where events follow one another without end, or no forces obey the laws, a millisecond is taken in short
-    steps; then the case goes on from event to event.
+    Where events follow one another without end, or no forces obey the laws, a millisecond is taken by
+    collocation; then the case goes on from event to event.
     """
 
     def __init__(
@@ -61,8 +61,8 @@ class FrictionMarch(StateSets):
         check: Callable[[], None] | None,
     ) -> None:
         """Start from `initial`, each pressed pair in the state that its forces give."""
-        self._steps = ShortSteps(
-            lambda: ContactSteppingMarch(
+        self._interlude = Interlude(
+            lambda: CollocationMarch(
                 self._setup, clearance, friction, State.at_rest(self._setup.model), check
             )
         )
@@ -70,12 +70,12 @@ class FrictionMarch(StateSets):
 
     def begin(self, setup: ModalSetup, place: Place) -> None:
         """Begin anew at another speed, each pressed pair in the state that its forces give."""
-        self._steps.forget()
+        self._interlude.forget()
         super().begin(setup, place)
 
     def start_again(self, state: State) -> bool:
         """Start the same case anew at another state, with the contact modes that it has met."""
-        self._steps.stop()
+        self._interlude.stop()
         return super().start_again(state)
 
     def _note_in(self, trail: Trail) -> None:
@@ -92,7 +92,7 @@ class FrictionMarch(StateSets):
         return setup.friction_library(friction)
 
     def _advance_sections(self, samples: Samples, accumulator: Accumulator, sections: Floats) -> int:
-        if self._steps.are_under_way:  # some short steps before events are followed again
+        if self._interlude.is_under_way:  # before events are followed again
             last_tick = self._end_of_revolution()
             outcome = self._kernel(last_tick, samples, accumulator, False)
             if outcome == FINISHED:
@@ -106,7 +106,7 @@ class FrictionMarch(StateSets):
 
     def _kernel(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
         while True:
-            if self._steps.are_under_way:
+            if self._interlude.is_under_way:
                 outcome = self._step_on(last_tick, samples, accumulator, is_recorded)
                 if outcome != FINISHED:
                     return outcome
@@ -144,16 +144,17 @@ class FrictionMarch(StateSets):
         )
 
     def _hand_over(self) -> None:
-        """Go over to short steps, from the motion at the tick reached."""
+        """Go over to collocation, from the motion at the tick reached."""
         self.n_left += 1
         self._work.trail.n_event[0] = BROKEN
-        self._steps.take_over(self.clock, self.progress, self._recorder, self._motion)
+        closed = self.closed(self.mask)
+        self._interlude.take_over(self.clock, self.progress, self._recorder, self._motion, closed)
 
     def _step_on(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
-        """Short steps as far as they are to go, or on until states go on; then these are wanted."""
+        """Collocation as far as it is to go, or on until states go on; then these are wanted."""
         place = last_tick, self.clock, self.progress, samples, accumulator, self._motion
         while True:
-            outcome, is_closed = self._steps.step_to(*place, is_recorded=is_recorded)
+            outcome, is_closed = self._interlude.advance(*place, is_recorded=is_recorded)
             if outcome != FINISHED:
                 return outcome
             try:
@@ -161,9 +162,9 @@ class FrictionMarch(StateSets):
             except NoClosedForm:
                 if self.progress.tick >= last_tick:
                     raise
-                self._steps.prolong(self.clock)
+                self._interlude.prolong(self.clock)
             else:
-                self._steps.stop()
+                self._interlude.stop()
                 ask_for(self.progress, states)
                 return outcome
 

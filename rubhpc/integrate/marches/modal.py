@@ -93,6 +93,13 @@ class ModalMarch(March):
         """Present motion, for another speed to continue from."""
         return Place(self.stands_at(), self._setup.model.sag, self._contact_force())
 
+    def moved(self, setup: ModalSetup, place: Place) -> Floats:
+        """Motion (2 n,) of a place about the sag of another set-up."""
+        motion = place.motion.copy()
+        if place.sag is not setup.model.sag and (moved := place.sag - setup.model.sag).any():
+            motion[: motion.size // 2] += setup.reduced.project[:, : moved.size] @ moved
+        return motion
+
     def stands_at(self) -> Floats:
         """The same as `motion`, found once at the end of a call."""
         return self.motion() if self._ended is None else self._ended
@@ -156,6 +163,12 @@ class ModalMarch(March):
     def _motion_in(self, mode: int, z: Floats) -> Floats:
         motion: Floats = self.tables.motion_re[mode] @ z[0] - self.tables.motion_im[mode] @ z[1]
         return motion
+
+    def gaps(self, setup: ModalSetup, place: Place) -> Floats:
+        """Linear gaps (q,), m, of a motion about the sag of a set-up in place of its own."""
+        displacement = place.motion[: self.bodies.stiffness.shape[0]]
+        open_: Floats = self._at_rest - sag_at_stators(setup.model)[0]
+        return open_ + self.bodies.gap_jacobian @ displacement
 
     def is_beyond(self, motion: Floats) -> bool:
         """Whether a motion (2 n,) takes the rotor beyond the limit."""

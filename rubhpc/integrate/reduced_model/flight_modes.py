@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.fem.statics import sag_at_stators
-from rubhpc.integrate.reduced_model.curved_library import _outputs, motion_rows
 from rubhpc.kernels._jit import plain
 from rubhpc.kernels.collocation.observing import Signals
 from rubhpc.kernels.collocation.structures import (
@@ -19,7 +18,6 @@ from rubhpc.kernels.collocation.structures import (
     BENDING,
     FIXED,
     HARD,
-    HERTZ,
     PENALTY,
     ROUND,
     TWIST,
@@ -28,14 +26,16 @@ from rubhpc.kernels.collocation.structures import (
     Tables,
     lobatto_nodes,
 )
-from rubhpc.kernels.contact_modes import LATERAL_RATE, LATERAL_ROW, N_ROTOR_ROW, TWIST_ACCELERATION_ROW
-from rubhpc.kernels.contact_pairs import rim_sense
+from rubhpc.kernels.contact_modes import LATERAL_RATE, LATERAL_ROW, N_ROTOR_ROW
+from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, TORSION, V, W, rim_sense
 from rubhpc.kernels.laws import STRIBECK, TABLE, is_set_valued
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from rubhpc.fem.model import Model, StatorModel
     from rubhpc.integrate.modal_setup import ModalSetup
+    from rubhpc.integrate.reduced_model.reduction import ReducedModel
 
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
@@ -46,47 +46,64 @@ SHORTEST_LEVEL = 6  # ticks of the shortest step, as a power of two
 MOST_SLOTS = 16
 RESTING = 1e-9  # of the largest exponent: smaller sums of two exponents count as zero
 ENOUGH = 0.3  # of the accuracy: share of the foreshortening that may be missed
+UNBENT = 1e-8  # bending displacement over the largest of a stator; smaller ones count as zero
 UNSEEN = 1e-14  # of the largest: eigenvalues of damping and skew stiffness that are rounding
 
 
 @dataclass(frozen=True, eq=False)
 class FlightModes:
-    """Modes with every pair open of one set-up, and what all its cases share."""
+    """Modes with every pair open of one set-up, and what all its cases share.
+
+    Attributes
+    ----------
+    eigenvalue : (m,), 1/s
+    eigenmotion : (2 n, m)
+        Reduced displacements, then velocities: the real part is the motion.
+    entry : (m, 2 n)
+        Modes from reduced displacements and velocities.
+    is_complex : (m,)
+        The other modes are real.
+    turning : complex, 1/s
+        Exponent of the unbalance force.
+    response : (2 n,)
+        Motion under it.
+    """
 
     setup: ModalSetup
+    eigenvalue: Complexes
+    eigenmotion: Complexes
+    entry: Complexes
+    is_complex: NDArray[np.bool_]
+    turning: complex
+    response: Complexes
 
     @cached_property
-    def order(self) -> tuple[Floats, int]:
-        """Modes in the order of the coordinates, as places among those of the open contact mode.
-
-        And the number of complex ones; the last of these is the response to the unbalance.
-        """
-        m = self.setup._opened.n_eigenmode
-        exponent = self.setup._opened.exponent[:m]
-        turning = np.flatnonzero(exponent.imag != 0.0)
-        return np.concatenate([turning, [m], np.flatnonzero(exponent.imag == 0.0)]), turning.size + 1
+    def n_complex(self) -> int:
+        """Number of complex modes, of which the response to the unbalance is the last."""
+        return int(np.count_nonzero(self.is_complex)) + 1
 
     @cached_property
     def exponent(self) -> Complexes:
-        """Exponents (nm,), 1/s."""
-        return np.ascontiguousarray(self.setup._opened.exponent[self.order[0]])
+        """Exponents (nm,) in the order of the coordinates, 1/s."""
+        turns = self.is_complex
+        return np.concatenate([self.eigenvalue[turns], [self.turning], self.eigenvalue[~turns]])
 
     @cached_property
     def shape(self) -> Complexes:
         """Reduced displacements, then velocities (2 n, nm)."""
-        return self.setup._opened.motion[:, self.order[0]]
+        turns = self.is_complex
+        return np.column_stack([self.eigenmotion[:, turns], self.response, self.eigenmotion[:, ~turns]])
 
     @cached_property
     def enter(self) -> Complexes:
         """Modes from reduced displacements and velocities, less the response to the unbalance (nm, 2 n)."""
-        (order, n_complex), mode = self.order, self.setup._opened
-        enter = np.zeros((order.size, mode.enter.shape[1]), dtype=complex)
-        enter[: n_complex - 1], enter[n_complex:] = mode.enter[order[: n_complex - 1]], mode.enter[order[n_complex:]]
-        return enter
+        turns = self.is_complex
+        none = np.zeros((1, self.entry.shape[1]))
+        return np.concatenate([self.entry[turns], none, self.entry[~turns]])
 
     def rows(self, values: Complexes) -> Floats:
         """Rows over the coordinates (r, nx) of rows over the modes (r, nm)."""
-        n = self.order[1]
+        n = self.n_complex
         rows: Floats = np.concatenate([values[:, :n].real, -values[:, :n].imag, values[:, n:].real], axis=1)
         return np.ascontiguousarray(rows)
 
@@ -97,8 +114,11 @@ class FlightModes:
 
     def coordinates(self, motion: Floats, cosine: float = 1.0, sine: float = 0.0) -> Floats:
         """Coordinates (nx,) of a reduced motion (2 n,) at the shaft's angle."""
-        n, response = self.order[1], self.shape[:, self.order[1] - 1]
-        z = self.enter @ (motion - (response.real * cosine - response.imag * sine))
+        n, response = self.n_complex, self.response.real * cosine - self.response.imag * sine
+        z = self.enter @ (motion - response)
+        z += self.enter @ (
+            motion - response - (self.shape @ z).real
+        )  # modes between others are not quite inverse
         z[n - 1] = cosine + 1j * sine
         return np.concatenate([z[:n].real, z[:n].imag, z[n:].real])
 
@@ -110,16 +130,10 @@ class FlightModes:
     @cached_property
     def local(self) -> Floats:
         """Local motions of all pairs from the reduced displacements (R, n)."""
-        setup = self.setup
-        given = motion_rows(setup.reduced, setup.model)
-        radius = np.array([stator.radius for stator in setup.model.stators])
-        bending = [foreshortening_rows(rows, setup.reduced.stiffness, setup.accuracy) for rows in given]
-        local = np.zeros((len(given), BENDING + max(map(len, bending)), given.shape[2]))
-        local[:, ALONG], local[:, ACROSS] = given[:, 0], self.sense * given[:, 1]
-        local[:, TWIST] = self.sense * radius[:, None] * given[:, -1]
-        for pair, rows in zip(local, bending, strict=True):
-            pair[BENDING : BENDING + len(rows)] = rows
-        return local.reshape(-1, given.shape[2])
+        local = motion_rows(self.setup.reduced, self.setup.model, self.setup.accuracy)
+        local[:, ACROSS] *= self.sense
+        local[:, TWIST] *= self.sense
+        return local.reshape(-1, local.shape[2])
 
     @cached_property
     def n_local(self) -> int:
@@ -139,15 +153,20 @@ class FlightModes:
     @cached_property
     def _bodies(self) -> Bodies:
         setup, law, n = self.setup, self.setup.law, self.local.shape[1]
-        q, n_complex = len(setup.model.stators), self.order[1]
+        q, n_complex = len(setup.model.stators), self.n_complex
         displaced, moving = self.local @ self.shape[:n], self.local @ self.shape[n:]
-        kick = np.concatenate([self.kicks[:, :n_complex].real, self.kicks[:, :n_complex].imag, self.kicks[:, n_complex:].real], axis=1)
+        kick = np.concatenate(
+            [self.kicks[:, :n_complex].real, self.kicks[:, :n_complex].imag, self.kicks[:, n_complex:].real],
+            axis=1,
+        )
         radius = np.array([stator.radius for stator in setup.model.stators])
         return Bodies(
             exponent=self.exponent,
             n_complex=n_complex,
             n_local=self.n_local,
-            local=np.concatenate([self.rows(displaced), self.rows(moving), self.rows(moving * self.exponent)]),
+            local=np.concatenate(
+                [self.rows(displaced), self.rows(moving), self.rows(moving * self.exponent)]
+            ),
             load=self.kicks,
             kick=np.ascontiguousarray(kick),
             bend=np.abs(moving * self.exponent),
@@ -209,7 +228,7 @@ class FlightModes:
     def signals(self) -> Signals:
         """Rows of the signals of a record."""
         reduced, n, s, n_row = self.setup.reduced, self.local.shape[1], self.nodes.at.size, len(self.local)
-        at, moving, driven = _outputs(reduced)
+        at, moving, driven = output_rows(reduced)
         displaced, going = self.shape[:n], self.shape[n:]
         pushed = going * self.exponent
         rough = np.flatnonzero(driven.any(axis=1))
@@ -219,7 +238,7 @@ class FlightModes:
         left, right, sign, n_loss, power = self._powers()
         tables, n_x = self.tables, self.motion.shape[1]
         k, n_seen = tables.is_filled.size, (s - 1) * (smooth.size + rough.size + len(power)) + smooth.size
-        gained, drift = energy_forms(self.exponent, self.order[1], power, left, right, sign, n_loss)
+        gained, drift = energy_forms(self.exponent, self.n_complex, power, left, right, sign, n_loss)
         return Signals(
             value=self.rows(at @ displaced + moving @ going + driven @ pushed),
             direct=np.ascontiguousarray(driven @ self.local.T),
@@ -255,7 +274,7 @@ class FlightModes:
         round_ = circulation > UNSEEN * np.abs(reduced.stiffness).max()
         d, c = len(dampers), int(round_.sum())
         turned = np.zeros((2, self.exponent.size), dtype=complex)
-        turned[:, self.order[1] - 1] = 1.0, -1j
+        turned[:, self.n_complex - 1] = 1.0, -1j
         rows = [dampers @ going, u.T[round_] @ going, (circulation[:, None] * v)[round_] @ displaced]
         forces = np.array([reduced.force[0], reduced.force[1]])
         rows += [forces @ going, turned]
@@ -264,24 +283,6 @@ class FlightModes:
         right = np.concatenate([np.arange(d), d + c + np.arange(c), [first + 2, first + 3]])
         sign = np.concatenate([np.sign(size[keep]), np.ones(c + 2)])
         return left, right, sign, d + c, self.rows(np.concatenate(rows))
-
-
-def foreshortening_rows(motion: Floats, stiffness: Floats, accuracy: float) -> Floats:
-    """Rows (b, n) whose squares add up to twice the foreshortening of a stator, for the accuracy asked for.
-
-    They are those of the pencil of foreshortening and stiffness, the first ones in the order of what they
-    add where a static force bends the stator. `motion` (3 + r, n) are its `motion_rows`.
-    """
-    rows = motion[2:-1][motion[2:-1].any(axis=1)]
-    if not len(rows):
-        return rows
-    compliant = np.linalg.lstsq(stiffness, np.vstack([rows, motion[1]]).T, rcond=None)[0]
-    turn = np.linalg.eigh(rows @ compliant[:, :-1])[1].T[::-1]
-    share = np.square(turn @ rows @ compliant[:, -1])
-    missed = share.sum() - np.cumsum(share)
-    n_kept = 1 + int(np.count_nonzero(missed > ENOUGH * accuracy * share.sum()))
-    kept: Floats = (turn @ rows)[:n_kept]
-    return kept
 
 
 def energy_forms(
@@ -317,3 +318,69 @@ def energy_forms(
         gained[kind] = (to_modes.T @ grown @ to_modes).real
         drift[kind] = (to_modes.T @ np.where(is_resting, form, 0.0) @ to_modes).real
     return gained, drift
+
+
+def motion_rows(reduced: ReducedModel, model: Model, accuracy: float) -> Floats:
+    """Local motions of each pair with the reduced coordinates, (q, 3 + b, n).
+
+    Of the tip against the disc along the stator's axis and across it, of the rim by the torsion, and the
+    bending displacements of the stator.
+    """
+    angle = np.array([stator.angle for stator in model.stators])[:, None]
+    ey, ez = np.cos(angle), np.sin(angle)
+    v, w, torsion, axial, lateral = (reduced.degree[:, a] for a in (V, W, TORSION, AXIAL, LATERAL))
+    across = lateral + ez * v - ey * w
+    bending = [
+        foreshortening_rows(bending_rows(stator, reduced, model, i), across[i], reduced.stiffness, accuracy)
+        for i, stator in enumerate(model.stators)
+    ]
+    rows = np.zeros((len(bending), BENDING + max(map(len, bending)), v.shape[1]))
+    rows[:, ALONG], rows[:, ACROSS] = axial - ey * v - ez * w, across
+    rows[:, TWIST] = np.array([stator.radius for stator in model.stators])[:, None] * torsion
+    for pair, those in zip(rows, bending, strict=True):
+        pair[BENDING : BENDING + len(those)] = those
+    return rows
+
+
+def bending_rows(stator: StatorModel, reduced: ReducedModel, model: Model, i: int) -> Floats:
+    """Displacements (b, n) whose squares add up to twice the foreshortening of a stator."""
+    if stator.squared_slope is None:
+        return np.zeros((0, reduced.stiffness.shape[0]))
+    first = model.stator_start[i]
+    basis = reduced.basis[first : first + stator.body.n_dof]
+    square, shape = np.linalg.eigh(stator.squared_slope)
+    _, size, turn = np.linalg.svd((np.sqrt(np.maximum(square, 0.0)) * shape).T @ basis, full_matrices=False)
+    keep = size > UNBENT * size.max()
+    rows: Floats = size[keep, None] * turn[keep]
+    return rows
+
+
+def output_rows(reduced: ReducedModel) -> Floats:
+    """Rows of outputs, as `kernels.contact_modes` numbers them, of displacements and their derivatives."""
+    still = np.zeros_like(reduced.output[:1])
+    rows = [[one, 0 * one, 0 * one] for one in reduced.output]
+    rows += [[0 * one, one, 0 * one] for one in reduced.output]
+    rows.append([still[0], still[0], reduced.output[2]])
+    places = [degree[[AXIAL, LATERAL]] for degree in reduced.degree] + list(reduced.carrier)
+    for axial, lateral in places:
+        rows += [[axial, 0 * axial, 0 * axial], [lateral, 0 * lateral, 0 * lateral]]
+        rows.append([0 * lateral, lateral, 0 * lateral])
+    rows += [list(one) for one in np.swapaxes(reduced.probe, 0, 1)]
+    return np.ascontiguousarray(np.swapaxes(np.array(rows), 0, 1))
+
+
+def foreshortening_rows(rows: Floats, across: Floats, stiffness: Floats, accuracy: float) -> Floats:
+    """Rows (b, n) whose squares add up to twice the foreshortening of a stator, for the accuracy asked for.
+
+    They are those of the pencil of foreshortening and stiffness, the first ones in the order of what they
+    add where a static force across the axis, (n,), bends the stator. `rows` (r, n) are as `bending_rows`.
+    """
+    if not len(rows):
+        return rows
+    compliant = np.linalg.lstsq(stiffness, np.vstack([rows, across]).T, rcond=None)[0]
+    turn = np.linalg.eigh(rows @ compliant[:, :-1])[1].T[::-1]
+    share = np.square(turn @ rows @ compliant[:, -1])
+    missed = share.sum() - np.cumsum(share)
+    n_kept = 1 + int(np.count_nonzero(missed > ENOUGH * accuracy * share.sum()))
+    kept: Floats = (turn @ rows)[:n_kept]
+    return kept

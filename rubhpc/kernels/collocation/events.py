@@ -58,7 +58,9 @@ def first_root(nodes: Nodes, values: Floats) -> float:
 
 
 @linked_sum
-def root_between(nodes: Nodes, values: Floats, begin: float, before: float, end: float, after: float) -> float:
+def root_between(
+    nodes: Nodes, values: Floats, begin: float, before: float, end: float, after: float
+) -> float:
     """Root between a place with a positive value and one with a negative value (Illinois' method)."""
     middle = end
     for _ in range(MOST_HALVINGS):
@@ -112,15 +114,14 @@ def fill_events(
 
 
 @linked_sum
-def first_event(
-    bodies: Bodies, nodes: Nodes, state: Ints, solution: Solution
-) -> tuple[float, int, int]:
+def first_event(bodies: Bodies, nodes: Nodes, state: Ints, solution: Solution) -> tuple[float, int, int]:
     """Place of the first event in a step, its pair and its kind, NORMAL or FRICTION; place 2 without one."""
     s, event = nodes.at.size, solution.event
     place, pair, kind = NO_ROOT, -1, NORMAL
     for i in range(state.size):
         values, is_watched = event[i, NORMAL], True
-        if state[i] == OPEN and values[0] < 0.0 and (solution.seen[i * s, RATE] > 0.0 or values[1] > 0.0):
+        is_opening = solution.seen[i * s, RATE] > 0.0 or values[1] > values[0]
+        if state[i] == OPEN and values[0] <= 0.0 and is_opening:
             # Closed within tolerance, and opening: no event before it has opened.
             k = 1
             while k < s and values[k] <= 0.0:

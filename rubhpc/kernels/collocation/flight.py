@@ -48,7 +48,14 @@ def fly(
     """
     n_complex, n_local, n_row = bodies.n_complex, bodies.n_local, bodies.load.shape[0]
     n_mode, q = bodies.exponent.size, bodies.radius.size
-    x, after, turn, start, local, bend = case.x, solution.after, solution.turn, solution.start, bodies.local, bodies.bend
+    x, after, turn, start, local, bend = (
+        case.x,
+        solution.after,
+        solution.turn,
+        solution.start,
+        bodies.local,
+        bodies.bend,
+    )
     size, highest = np.empty(n_mode), power.shape[0] - 1
     ahead, is_exact, n_look, begun = min(unseen, last_tick - tick), True, 0, tick
     while True:

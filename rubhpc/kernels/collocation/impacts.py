@@ -60,7 +60,9 @@ def push_instant(bodies: Bodies, s: int, force: Floats, solution: Solution, x: F
         if force[i, NORMAL] == 0.0 and force[i, FRICTION] == 0.0:
             continue
         for a in range(n_local):
-            size = force[i, NORMAL] * solution.normal[i * s, a] + force[i, FRICTION] * solution.tangent[i * s, a]
+            size = (
+                force[i, NORMAL] * solution.normal[i * s, a] + force[i, FRICTION] * solution.tangent[i * s, a]
+            )
             if size != 0.0:
                 row = kick[i * n_local + a]
                 for k in range(x.size):
@@ -118,11 +120,14 @@ def find_forces(bodies: Bodies, s: int, state: Ints, solution: Solution, force: 
 
 
 @linked_sum
-def find_impulses(bodies: Bodies, s: int, touching: Flags, kept: Flags, least: float, solution: Solution) -> None:
+def find_impulses(
+    bodies: Bodies, s: int, touching: Flags, kept: Flags, bound: Flags, least: float, solution: Solution
+) -> None:
     """Impulses of the pairs in `touching` at the local motions `start`, into `solution.impulse`.
 
     Newton's restitution for approaches faster than `least` (m/s), and Coulomb's cone, or steady sliding: by
-    Gauss and Seidel's method over the pairs. Pairs in `kept` were closed before: their gap rates are rounding.
+    Gauss and Seidel's method over the pairs. Pairs in `kept` were closed before: their gap rates are rounding;
+    those in `bound` stay closed, by an impulse that may pull.
     """
     q, speed, impulse = touching.size, solution.speed, solution.impulse
     normal, tangent = solution.normal, solution.tangent
@@ -145,7 +150,7 @@ def find_impulses(bodies: Bodies, s: int, touching: Flags, kept: Flags, least: f
                     slip -= coupling(bodies, tangent, i * s, i, tangent, j * s, j) * impulse[j, FRICTION]
             before = speed[i, NORMAL]
             wanted = -bodies.restitution[i] * min(before, 0.0) if -before > least else 0.0
-            n, t = impulse_of(bodies, s, i, opening - wanted, slip, solution)
+            n, t = impulse_of(bodies, s, i, opening - wanted, slip, bound[i], solution)
             moved = max(moved, abs(n - impulse[i, NORMAL]), abs(t - impulse[i, FRICTION]))
             largest = max(largest, n)
             impulse[i, NORMAL], impulse[i, FRICTION] = n, t
@@ -154,17 +159,19 @@ def find_impulses(bodies: Bodies, s: int, touching: Flags, kept: Flags, least: f
 
 
 @linked_sum
-def impulse_of(bodies: Bodies, s: int, i: int, opening: float, slip: float, solution: Solution) -> tuple[float, float]:
+def impulse_of(
+    bodies: Bodies, s: int, i: int, opening: float, slip: float, is_bound: bool, solution: Solution
+) -> tuple[float, float]:
     """Impulses of one pair that would open at a rate and slip (m/s) without them."""
     normal, tangent, row = solution.normal, solution.tangent, i * s
-    if opening >= 0.0:
+    if opening >= 0.0 and not is_bound:
         return 0.0, 0.0
     a, b = (
         coupling(bodies, normal, row, i, normal, row, i),
         coupling(bodies, normal, row, i, tangent, row, i),
     )
     ratio = friction_ratio(bodies, i, solution.speed[i, FRICTION])[0]
-    if not bodies.is_sticky:
+    if not bodies.is_sticky or opening >= 0.0:
         n = -opening / (a + ratio * b)
         return n, ratio * n
     c, d = (

@@ -8,11 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_sum, linked_sum
-from rubhpc.kernels.case_progress import CONTACT_UNSOLVED, DIVERGED, FINISHED, MOST_STEPS, PAUSED, Clock, Progress
+from rubhpc.kernels.case_progress import (
+    CONTACT_UNSOLVED,
+    DIVERGED,
+    FINISHED,
+    MOST_STEPS,
+    PAUSED,
+    Clock,
+    Progress,
+)
 from rubhpc.kernels.collocation.events import fill_events, first_event
 from rubhpc.kernels.collocation.flight import GAP_TOLERANCE, fly
 from rubhpc.kernels.collocation.impacts import (
     clear_impulses,
+    coupling,
     find_forces,
     find_impulses,
     is_jammed,
@@ -58,12 +67,15 @@ Ints = NDArray[np.int64]
 STEPPING, TRYING, SETTLING = range(3)  # what is to be done next while a pair is closed
 ALLOWED = 3.0  # error of the forces of a step over the accuracy
 NEWTON = 0.03  # tolerance of the forces in Newton's method, over that of the steps
-AVERAGED = 20e-6  # s: an error of the force in a shorter step counts as the error of its impulse over that time
+AVERAGED = (
+    20e-6  # s: an error of the force in a shorter step counts as the error of its impulse over that time
+)
 BEGINNING = 1.0 / 125.0  # first step of a contact over the last contact of the pair
 GROWING = 60.0  # steps are doubled where their error is so much less than the tolerance
 LEAST_SCALE = 1e-3  # N, of forces
 OPENED = 1e-3  # of the last contact: ticks after a release that are not looked at
 MOST_AT_ONCE = 64  # events at one tick, and as many for each pair
+BRIEF = 512.0  # ticks: a closed pair does not part for less where another one touches
 NO_SLIP = 1e-9  # m/s
 PARTED = 1e-9  # of the rim's speed: gap rate above which a pair has parted in an impact
 
@@ -174,7 +186,20 @@ def take_event(
         if is_recorded:
             seen.measured.accumulator.n_contact[pair] += 1
         if bodies.normal_law[pair] == HARD:
-            if not strike(bodies, s, clock, pair, acceleration, is_recorded, accuracy, progress, memory, case, solution, seen):
+            if not strike(
+                bodies,
+                nodes,
+                clock,
+                pair,
+                acceleration,
+                is_recorded,
+                accuracy,
+                progress,
+                memory,
+                case,
+                solution,
+                seen,
+            ):
                 return False
         memory.slot = lowest
         if case.lasting[pair] > 0.0:
@@ -203,7 +228,7 @@ def take_event(
 @linked_sum
 def strike(
     bodies: Bodies,
-    s: int,
+    nodes: Nodes,
     clock: Clock,
     pair: int,
     acceleration: float,
@@ -220,7 +245,7 @@ def strike(
     Rebounds end where no flight is seen: below a share, the accuracy, of the fastest approach, or within a
     few ticks or the tolerance of gaps.
     """
-    state = case.state
+    state, s = case.state, nodes.at.size
     see_rates(bodies, s, pair, solution)
     approach = -solution.seen[pair * s, RATE]
     memory.fastest = max(memory.fastest, approach)
@@ -229,7 +254,10 @@ def strike(
     for i in range(state.size):
         solution.kept[i] = state[i] != OPEN and i != pair and bodies.normal_law[i] == HARD
         solution.touching[i] = solution.kept[i] or i == pair
-    find_impulses(bodies, s, solution.touching, solution.kept, least, solution)
+        solution.bound[i] = False
+    find_impulses(bodies, s, solution.touching, solution.kept, solution.bound, least, solution)
+    if bind_pairs(bodies, nodes, clock, accuracy, progress, memory, case, solution):
+        find_impulses(bodies, s, solution.touching, solution.kept, solution.bound, least, solution)
     push_instant(bodies, s, solution.impulse, solution, case.x)
     see_start(bodies, case.x, solution)
     for i in range(state.size):
@@ -238,7 +266,7 @@ def strike(
         see_rates(bodies, s, i, solution)
         if is_jammed(bodies, s, i, FORWARD, solution):
             return False
-        if solution.impulse[i, NORMAL] == 0.0 or bodies.restitution[i] > 0.0:
+        if not solution.bound[i] and (solution.impulse[i, NORMAL] == 0.0 or bodies.restitution[i] > 0.0):
             rate = solution.seen[i * s, RATE]
             if rate > PARTED * (bodies.rim_speed[i] + approach) + 1e-12:
                 state[i], solution.waiting[i] = OPEN, False
@@ -254,9 +282,44 @@ def strike(
 
 
 @linked_sum
-def begin_trial(
-    bodies: Bodies, s: int, i: int, is_still: bool, case: CaseState, solution: Solution
-) -> int:
+def bind_pairs(
+    bodies: Bodies,
+    nodes: Nodes,
+    clock: Clock,
+    accuracy: float,
+    progress: Progress,
+    memory: Memory,
+    case: CaseState,
+    solution: Solution,
+) -> bool:
+    """Mark the closed pairs that an impact of another one opens, but their forces close again at once.
+
+    Pairs that throw each other open would touch without end.
+    """
+    s, is_any = nodes.at.size, False
+    for i in range(bodies.radius.size):
+        if not solution.kept[i] or solution.impulse[i, NORMAL] > 0.0:
+            continue
+        rate = 0.0
+        for j in range(bodies.radius.size):
+            if solution.impulse[j, NORMAL] != 0.0 or solution.impulse[j, FRICTION] != 0.0:
+                n, t = solution.impulse[j, NORMAL], solution.impulse[j, FRICTION]
+                rate += coupling(bodies, solution.normal, i * s, i, solution.normal, j * s, j) * n
+                rate += coupling(bodies, solution.normal, i * s, i, solution.tangent, j * s, j) * t
+        own = coupling(bodies, solution.normal, i * s, i, solution.normal, i * s, i)
+        pressed = own * max(
+            0.0, value_at(nodes, case.force[i, NORMAL], memory.part if memory.length > 0 else 0.0)
+        )
+        brief = max(
+            BRIEF * clock.tick, accuracy * max(case.lasting[i], (progress.tick - case.since[i]) * clock.tick)
+        )
+        solution.bound[i] = 2.0 * rate <= pressed * brief
+        is_any = is_any or solution.bound[i]
+    return is_any
+
+
+@linked_sum
+def begin_trial(bodies: Bodies, s: int, i: int, is_still: bool, case: CaseState, solution: Solution) -> int:
     """Return the state that is tried first for a pair that may stick."""
     see_start(bodies, case.x, solution)
     see_rates(bodies, s, i, solution)
@@ -306,6 +369,11 @@ def advance_by_collocation(
     todo, pair, kind, acceleration = STEPPING, -1, NORMAL, 0.0
     tried, attempt, first_tried, is_still = STICKING, 0, STICKING, False
     trial = int(np.int64(-1))
+    if memory.is_new == 1 and any_closed(state):
+        for i in range(state.size):
+            solution.waiting[i] = bodies.is_sticky and state[i] != OPEN
+        todo = TRYING
+    memory.is_new = 0
     while True:
         if todo == SETTLING:  # constants to begin with
             see_start(bodies, x, solution)
@@ -328,7 +396,6 @@ def advance_by_collocation(
             )
             memory.unseen = 0
             progress.n_step += n_look
-            solution.count[2] += n_look
             if is_recorded:
                 record_flight(bodies, signals, power, clock, begun, tick, x, progress, seen)
             progress.tick, kind = tick, NORMAL
@@ -365,10 +432,18 @@ def advance_by_collocation(
                 fill_step(bodies, nodes, tables, slot)
             step = tables.tick * 2.0 ** (tables.first_level + slot)
             n_iteration = take_step(
-                bodies, nodes, tables, slot, x, state, solution.guess, NEWTON * accuracy * memory.scale, False, solution
+                bodies,
+                nodes,
+                tables,
+                slot,
+                x,
+                state,
+                solution.guess,
+                NEWTON * accuracy * memory.scale,
+                False,
+                solution,
             )
             progress.n_step += 1
-            solution.count[3] += 1
             if todo == TRYING:
                 solution.waiting[trial] = False
                 if n_iteration < 0:
@@ -406,7 +481,6 @@ def advance_by_collocation(
                         for k in range(s):
                             largest = max(largest, abs(solution.guess[i, NORMAL, k]))
             if n_iteration < 0 or error > ALLOWED * accuracy * largest:
-                solution.count[4] += 1
                 if slot > 0:
                     memory.slot = slot - 1
                     if n_iteration < 0:
@@ -448,13 +522,16 @@ def advance_by_collocation(
                 if taken == whole:
                     end_of_step(bodies, tables, slot, x, solution.load, after)
                 else:
-                    solution.count[5] += 1
                     within_step(bodies, nodes, step, taken / whole, x, solution.load, solution.turn, after)
                 for k in range(n_x):
                     x[k] = after[k]
                 progress.tick += taken
                 case.force[:] = solution.guess
-                memory.scale, memory.length, memory.part = max(LEAST_SCALE, 0.999 * largest), whole, taken / whole
+                memory.scale, memory.length, memory.part = (
+                    max(LEAST_SCALE, 0.999 * largest),
+                    whole,
+                    taken / whole,
+                )
                 memory.slot = slot
                 if taken == whole and error < ALLOWED * accuracy * largest / GROWING and slot < top:
                     memory.slot = slot + 1

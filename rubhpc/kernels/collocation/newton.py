@@ -136,7 +136,9 @@ def see_start(bodies: Bodies, x: Floats, solution: Solution) -> None:
 
 
 @linked_sum
-def push_closed(bodies: Bodies, nodes: Nodes, state: Ints, force: Floats, n_closed: int, solution: Solution) -> None:
+def push_closed(
+    bodies: Bodies, nodes: Nodes, state: Ints, force: Floats, n_closed: int, solution: Solution
+) -> None:
     """Loads at the nodes by the forces and directions there; T of steady sliding follows from N."""
     s, n_local, n_row = nodes.at.size, bodies.n_local, bodies.load.shape[0]
     for c in range(n_closed):
@@ -152,7 +154,9 @@ def push_closed(bodies: Bodies, nodes: Nodes, state: Ints, force: Floats, n_clos
 
 
 @linked_sum
-def respond(tables: Tables, slot: int, n_row: int, n_local: int, n_closed: int, n_y: int, solution: Solution) -> None:
+def respond(
+    tables: Tables, slot: int, n_row: int, n_local: int, n_closed: int, n_y: int, solution: Solution
+) -> None:
     """Motion y under the loads of the closed pairs."""
     y, y_free, forced, load = solution.y, solution.y_free, tables.forced[slot], solution.load
     for r in range(n_y):
@@ -200,7 +204,14 @@ def see_pair(bodies: Bodies, nodes: Nodes, i: int, solution: Solution) -> None:
 
 @linked_sum
 def fill_residual(
-    bodies: Bodies, nodes: Nodes, tables: Tables, slot: int, state: Ints, force: Floats, n_closed: int, solution: Solution
+    bodies: Bodies,
+    nodes: Nodes,
+    tables: Tables,
+    slot: int,
+    state: Ints,
+    force: Floats,
+    n_closed: int,
+    solution: Solution,
 ) -> None:
     """Fill the residuals of all equations."""
     s, n_local, n_row, residual = nodes.at.size, bodies.n_local, bodies.load.shape[0], solution.residual
@@ -249,7 +260,9 @@ def fill_residual(
 
 
 @linked_sum
-def fill_slopes(bodies: Bodies, nodes: Nodes, state: Ints, force: Floats, n_closed: int, solution: Solution) -> None:
+def fill_slopes(
+    bodies: Bodies, nodes: Nodes, state: Ints, force: Floats, n_closed: int, solution: Solution
+) -> None:
     """Slopes of the laws, directions of the unknown forces and turning of the loads, at all nodes."""
     s, n_local, n_row = nodes.at.size, bodies.n_local, bodies.load.shape[0]
     for c in range(n_closed):
@@ -267,7 +280,9 @@ def fill_slopes(bodies: Bodies, nodes: Nodes, state: Ints, force: Floats, n_clos
                 solution.direction[row, FRICTION, a] = tangent[a]
                 for b in range(n_local):
                     solution.turning[row, a, b] = n * of_normal[a, b] + t * of_tangent[a, b]
-            rates, v = (solution.start, n_row + first) if k == 0 else (solution.y, rate_row(s, n_row, k) + first)
+            rates, v = (
+                (solution.start, n_row + first) if k == 0 else (solution.y, rate_row(s, n_row, k) + first)
+            )
             bent = solution.bent[row]
             for a in range(n_local):
                 of_rate, of_slip = 0.0, 0.0
@@ -276,7 +291,9 @@ def fill_slopes(bodies: Bodies, nodes: Nodes, state: Ints, force: Floats, n_clos
                     of_slip -= rates[v + b] * of_tangent[b, a]
                 bent[OF_RATE, a], bent[OF_SLIP, a], bent[OF_BEND, a] = of_rate, of_slip, 0.0
             if bodies.is_varied and state[i] != STICKING:
-                solution.ratio[row, RATIO], solution.ratio[row, RATIO_SLOPE] = friction_ratio(bodies, i, seen[SLIP])
+                solution.ratio[row, RATIO], solution.ratio[row, RATIO_SLOPE] = friction_ratio(
+                    bodies, i, seen[SLIP]
+                )
             if bodies.normal_law[i] != HARD:
                 fill_spring_slopes(bodies, i, row, solution)
                 if is_last and bodies.damping[i] > 0.0:
@@ -326,7 +343,14 @@ def fill_bend_slope(bodies: Bodies, i: int, row: int, v: int, at: int, solution:
 
 @linked_sum
 def change_pair(
-    bodies: Bodies, nodes: Nodes, i: int, first_node: int, begun: Floats, change: Floats, moved: Floats, solution: Solution
+    bodies: Bodies,
+    nodes: Nodes,
+    i: int,
+    first_node: int,
+    begun: Floats,
+    change: Floats,
+    moved: Floats,
+    solution: Solution,
 ) -> None:
     """Fill `changed` with the change of what is seen of a pair, from a node on.
 
@@ -337,7 +361,12 @@ def change_pair(
     is_hard = bodies.normal_law[i] == HARD
     for k in range(first_node, s):
         row, is_last, changed = i * s + k, k == s - 1, solution.changed[k]
-        normal, tangent, seen, bent = solution.normal[row], solution.tangent[row], solution.seen[row], solution.bent[row]
+        normal, tangent, seen, bent = (
+            solution.normal[row],
+            solution.tangent[row],
+            solution.seen[row],
+            solution.bent[row],
+        )
         gap = 0.0
         for a in range(n_local):
             gap += normal[a] * moved[k, first + a]
@@ -398,7 +427,9 @@ def change_residual(
         grown = 0.0
         for k in range(1, s):
             by = slope[i * s + k]
-            target[row + k - 1] = pushed[NORMAL, k] - by[BY_GAP] * changed[k, GAP] - by[BY_RATE] * changed[k, RATE]
+            target[row + k - 1] = (
+                pushed[NORMAL, k] - by[BY_GAP] * changed[k, GAP] - by[BY_RATE] * changed[k, RATE]
+            )
         for k in range(s):
             grown += nodes.end_slope[k] * pushed[NORMAL, k]
         by, seen = slope[i * s + s - 1], solution.seen[i * s + s - 1]
@@ -474,7 +505,13 @@ def fill_matrix(
 ) -> bool:
     """Make the matrix of the equations, and its factors; False where it is singular."""
     s, n_local, n_row = nodes.at.size, bodies.n_local, bodies.load.shape[0]
-    forced, change, moved, pushed, col = tables.forced[slot], solution.change, solution.moved, solution.pushed, 0
+    forced, change, moved, pushed, col = (
+        tables.forced[slot],
+        solution.change,
+        solution.moved,
+        solution.pushed,
+        0,
+    )
     fill_slopes(bodies, nodes, state, force, n_closed, solution)
     for r in range(solution.begun.size):
         solution.begun[r] = 0.0
@@ -522,7 +559,14 @@ def fill_matrix(
 
 @linked_sum
 def noise_of(
-    bodies: Bodies, nodes: Nodes, slot: int, state: Ints, n_closed: int, n_pushed: int, n: int, solution: Solution
+    bodies: Bodies,
+    nodes: Nodes,
+    slot: int,
+    state: Ints,
+    n_closed: int,
+    n_pushed: int,
+    n: int,
+    solution: Solution,
 ) -> float:
     """Largest force that the rounding of displacements causes, N."""
     s, residual, size, row = nodes.at.size, solution.residual, 0.0, 0
@@ -576,7 +620,12 @@ def take_step(
     n_y = (2 * s - 1) * n_row
     n_closed, n_pushed, n = list_closed(bodies, nodes, state, solution)
     y_free, place, y, free = solution.y_free, solution.place, solution.y, tables.free[slot]
-    matrix, pivot, residual, load = solution.matrix[slot], solution.pivot[slot], solution.residual, solution.load
+    matrix, pivot, residual, load = (
+        solution.matrix[slot],
+        solution.pivot[slot],
+        solution.residual,
+        solution.load,
+    )
     code = code_of(state)
     if solution.states[slot] != code:
         solution.states[slot] = 0
@@ -604,7 +653,6 @@ def take_step(
     last, largest, iteration, is_solved, is_fresh = np.inf, 0.0, 0, False, False
     while iteration < MOST_ITERATIONS:
         iteration += 1
-        solution.count[1] += 1
         for c in range(n_closed):
             i = solution.closed[c]
             for k in range(1, s):
@@ -615,10 +663,7 @@ def take_step(
             return iteration
         fill_residual(bodies, nodes, tables, slot, state, force, n_closed, solution)
         if solution.states[slot] == 0 or is_solved:
-            solution.count[0] += 1
-            if not fill_matrix(
-                bodies, nodes, tables, slot, state, force, n_closed, n, n_y, solution
-            ):
+            if not fill_matrix(bodies, nodes, tables, slot, state, force, n_closed, n, n_y, solution):
                 solution.states[slot] = 0
                 return -iteration
             solution.states[slot], is_fresh = code, True

@@ -26,7 +26,6 @@ from rubhpc.kernels.collocation.structures import (
     FRICTION,
     HARD,
     NORMAL,
-    OPEN,
     RATE,
     SLIP,
     STICKING,
@@ -35,7 +34,7 @@ from rubhpc.kernels.collocation.structures import (
     Solution,
     Tables,
 )
-from rubhpc.kernels.collocation.tables import rate_row, turn_freely, weights
+from rubhpc.kernels.collocation.tables import turn_freely, weights
 from rubhpc.kernels.sampling import Measured, store_samples, widen_extrema
 
 Floats = NDArray[np.float64]
@@ -89,7 +88,11 @@ def fill_signals(bodies: Bodies, nodes: Nodes, tables: Tables, signals: Signals,
     n_smooth, n_rough, n_power = signals.smooth.size, signals.rough.size, signals.power.shape[0]
     step = tables.tick * 2.0 ** (tables.first_level + slot)
     phi, weight = np.empty(s + 1, np.complex128), np.empty(s, np.complex128)
-    turn, row, turned = np.empty(n_mode, np.complex128), np.empty(n_complex + n_mode), np.empty(n_complex + n_mode)
+    turn, row, turned = (
+        np.empty(n_mode, np.complex128),
+        np.empty(n_complex + n_mode),
+        np.empty(n_complex + n_mode),
+    )
     moved = np.empty((s * n_row, n_complex + n_mode))
     per_node = n_smooth + n_rough + n_power
     for i in range(1, s):
@@ -237,7 +240,14 @@ def record_flight(
 
 @linked_sum
 def record_instant(
-    bodies: Bodies, signals: Signals, clock: Clock, force: Floats, x: Floats, progress: Progress, seen: Seen, load: Floats
+    bodies: Bodies,
+    signals: Signals,
+    clock: Clock,
+    force: Floats,
+    x: Floats,
+    progress: Progress,
+    seen: Seen,
+    load: Floats,
 ) -> None:
     """Record the sample at the coordinates x, under the loads (R,) of the instant."""
     value, direct = seen.measured.recorder.value, signals.direct
@@ -288,18 +298,43 @@ def record_step(
             value[signals.rough[r]] = value_at(nodes, seen.node[signals.rough[r]], at)
         take_row_sample(n_output, clock, progress, seen.measured)
     for c in range(n_closed):
-        record_contact(bodies, nodes, solution.closed[c], clock, step, taken, ticks, state, force, progress, solution, seen)
+        record_contact(
+            bodies,
+            nodes,
+            solution.closed[c],
+            clock,
+            step,
+            taken,
+            ticks,
+            state,
+            force,
+            progress,
+            solution,
+            seen,
+        )
     record_powers(nodes, signals, step, taken / ticks, seen)
 
 
 @linked_sum
 def read_step(
-    bodies: Bodies, nodes: Nodes, tables: Tables, signals: Signals, slot: int, x: Floats, solution: Solution, seen: Seen
+    bodies: Bodies,
+    nodes: Nodes,
+    tables: Tables,
+    signals: Signals,
+    slot: int,
+    x: Floats,
+    solution: Solution,
+    seen: Seen,
 ) -> None:
     """Read signals and factors of powers at the nodes of a step."""
     s, n_row = nodes.at.size, bodies.load.shape[0]
     n_smooth, n_rough, n_power = signals.smooth.size, signals.rough.size, signals.power.shape[0]
-    per_node, load, read, forced = n_smooth + n_rough + n_power, solution.load, seen.read, signals.forced[slot]
+    per_node, load, read, forced = (
+        n_smooth + n_rough + n_power,
+        solution.load,
+        seen.read,
+        signals.forced[slot],
+    )
     read_rows(signals.free[slot], x, read)
     for c in range(load.size):
         f, row = load[c], forced[c]

@@ -132,13 +132,13 @@ class Solution(Struct):
     instant: Floats  # (q, 2), forces
     touching: NDArray[np.bool_]  # (q,), pairs that an impact may press
     kept: NDArray[np.bool_]  # (q,), those of them that were closed before
+    bound: NDArray[np.bool_]  # (q,), those of them that an impact does not open
     waiting: NDArray[np.bool_]  # (q,), pairs that may stick or slip
     event: Floats  # (q, 2, s), event functions
     after: Floats  # (nx,)
     turn: Complexes  # (nm,)
     impulse: Floats  # (q, 2)
     speed: Floats  # (q, 2), gap rate and slip before an impact
-    count: Ints
 
 
 class CaseState(Struct):
@@ -161,7 +161,8 @@ class Memory(Protocol):
     fastest: float  # m/s, largest rate of approach
     unseen: int  # ticks of a flight that are taken without looking for a touch
     n_at_once: int  # events at one tick
-    event_tick: int
+    event_tick: int  # of the last one
+    is_new: int  # forces and states are to be found
 
 
 _RECORD = np.dtype(

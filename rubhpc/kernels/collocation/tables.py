@@ -75,7 +75,9 @@ def fading(time: float, fading_time: float) -> tuple[float, float, float, float]
 
 
 @linked_sum
-def weights(nodes: Nodes, exponent: complex, time: float, part: float, phi: Complexes, weight: Complexes) -> None:
+def weights(
+    nodes: Nodes, exponent: complex, time: float, part: float, phi: Complexes, weight: Complexes
+) -> None:
     """Response of a mode after a time (s), a part of a step, to loads that are basis polynomials (s,)."""
     s = nodes.at.size
     fill_phi(exponent * time, phi)
@@ -171,7 +173,14 @@ def end_of_step(bodies: Bodies, tables: Tables, slot: int, x: Floats, load: Floa
 
 @linked_sum
 def within_step(
-    bodies: Bodies, nodes: Nodes, step: float, part: float, x: Floats, load: Floats, turn: Complexes, after: Floats
+    bodies: Bodies,
+    nodes: Nodes,
+    step: float,
+    part: float,
+    x: Floats,
+    load: Floats,
+    turn: Complexes,
+    after: Floats,
 ) -> None:
     """Coordinates after a part of a step (s) under the loads of the whole; fills the factors `turn` (nm,)."""
     n_complex, n_row, s, power = bodies.n_complex, bodies.load.shape[0], nodes.at.size, nodes.power

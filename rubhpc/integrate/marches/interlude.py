@@ -1,4 +1,4 @@
-"""Short steps in place of closed form, where events have no end or no forces obey the laws."""
+"""The collocation integrator for a while, where events of the closed form have no end or no forces obey the laws."""
 
 from __future__ import annotations
 
@@ -12,18 +12,19 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
+    from rubhpc.integrate.marches.collocation import CollocationMarch
     from rubhpc.kernels.accumulators import Accumulator, Samples
     from rubhpc.kernels.case_progress import Clock, Progress
     from rubhpc.kernels.sampling import Recorder
 
     Floats = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
 
-PASSING = 1e-3  # s, taken in short steps: many periods of what bounces so fast
+PASSING = 1e-3  # s, taken by collocation: many periods of what bounces so fast
 
 
-class ShortSteps:
-    """The march in short steps of a case that else goes from event to event, made when it is first needed.
+class Interlude:
+    """The march by collocation of a case that else goes from event to event, made when it is first needed.
 
     Parameters
     ----------
@@ -31,14 +32,14 @@ class ShortSteps:
         Makes it, at the speed of the case.
     """
 
-    def __init__(self, make: Callable[[], ContactSteppingMarch]) -> None:
+    def __init__(self, make: Callable[[], CollocationMarch]) -> None:
         """Take no steps at first."""
         self._make = make
-        self._march: ContactSteppingMarch | None = None
+        self._march: CollocationMarch | None = None
         self._n_tick = 0  # still to be taken
 
     @property
-    def are_under_way(self) -> bool:
+    def is_under_way(self) -> bool:
         """Whether ticks are still to be taken."""
         return self._n_tick > 0
 
@@ -50,19 +51,20 @@ class ShortSteps:
         """Stop, and make another march when it is needed: the speed is another one."""
         self._march, self._n_tick = None, 0
 
-    def take_over(self, clock: Clock, progress: Progress, recorder: Recorder, motion: Floats) -> None:
-        """Begin at the tick reached, with a motion (2 n,)."""
+    def take_over(
+        self, clock: Clock, progress: Progress, recorder: Recorder, motion: Floats, closed: Flags
+    ) -> None:
+        """Begin at the tick reached, with a motion (2 n,) and the closed pairs (q,)."""
         self._march = self._march or self._make()
         self.prolong(clock)
-        follow(self._march.progress, progress)
-        self._march.take_over(clock, recorder, motion)
+        self._march.take_over(clock, progress, recorder, motion, closed)
 
     def prolong(self, clock: Clock) -> None:
-        """Take steps for a millisecond more, at most for a revolution."""
+        """Go on for a millisecond more, at most for a revolution."""
         revolution = clock.samples_per_revolution << clock.sample_level
         self._n_tick = min(revolution, max(1, round(PASSING / clock.tick)))
 
-    def step_to(
+    def advance(
         self,
         last_tick: int,
         clock: Clock,
@@ -72,8 +74,8 @@ class ShortSteps:
         motion: Floats,
         *,
         is_recorded: bool,
-    ) -> tuple[int, NDArray[np.bool_]]:
-        """Step as far as steps are to be taken, up to a tick; `progress` follows, and `motion` at the end.
+    ) -> tuple[int, Flags]:
+        """Go on as far as ticks are to be taken, up to one; `progress` follows, and `motion` at the end.
 
         Returns
         -------
@@ -84,11 +86,11 @@ class ShortSteps:
         """
         march, before = self._march, int(progress.tick)
         assert march is not None
-        outcome = march.step_to(
+        outcome = march.advance_to(
             min(last_tick, before + self._n_tick), clock, samples, accumulator, is_recorded
         )
         follow(progress, march.progress)
         self._n_tick -= int(progress.tick) - before
         if outcome == FINISHED:
-            motion[:] = march.motion_of(march.progress, march.coordinates)
+            motion[:] = march.motion()
         return outcome, march.touching()
