@@ -113,10 +113,10 @@ class ContactKeys:
     def __post_init__(self) -> None:
         check_fields(self)
         for key in ("normal", "friction_law"):
-            given, meant = getattr(self, key), chosen(key, self.model)
+            given = getattr(self, key)
             if given is None:
-                object.__setattr__(self, key, meant)
-            elif self.model is not None and given != meant:
+                object.__setattr__(self, key, chosen(key, self.model))
+            elif self.model is not None and given != (meant := chosen(key, self.model)):
                 problem = f'"{given}" conflicts with model = "{self.model}", which has "{meant}"'
                 raise FieldError(key, f"{problem}; remove one of them")
 

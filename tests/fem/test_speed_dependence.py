@@ -5,9 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from closed_form import run_up, simulate
 from trial_rig import trial_rig
 
-from rubhpc import InputError, assemble, run_up, simulate
+from rubhpc import InputError, assemble
 from rubhpc.fem.assemble import model_at
 from rubhpc.fem.modes import modes
 from rubhpc.fem.response import (

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import Contact, read_rig, simulate
 
-from rubhpc import InputError, State, read_rig, simulate
+from rubhpc import InputError, State
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency, step_limit
 from rubhpc.integrate.case import run_case
@@ -17,7 +18,7 @@ from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import PACKAGED, with_keys
 from rubhpc.schema import DIVERGED, DONE, SECTION_NAMES, SIGNAL_NAMES, VARIABLES
 from rubhpc.spectra import amplitude_spectrum
-from rubhpc.study.study import Contact, Integrator, Recording
+from rubhpc.study.study import Integrator, Recording
 
 RIG = read_rig("mokhtar2017")
 MODEL = assemble(RIG)

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import zarr
+from closed_form import read_rig
 
-from rubhpc.rig.reading import read_rig
 from rubhpc.schema import DIVERGED, DONE, VARIABLES
 from rubhpc.storage.block_files import BlockFiles
 from rubhpc.storage.layout import build, encode
