@@ -167,7 +167,7 @@ def drawn_rows(store: xr.Dataset) -> list[dict[str, str]]:
 
 def study_rows(store: xr.Dataset) -> list[tuple[str, str]]:
     """Return how speed, contact, integration and recording were set, from the attributes of the store."""
-    model = model_of(store)
+    model = model_of(store).removeprefix("model ")
     return [("Model", model)] * bool(model) + setting_rows(table_of(store, "study"))
 
 
