@@ -24,7 +24,7 @@ CASE = {"clearance": "100 um", "friction": 0.3, "transient": 0, "samples_per_rev
 
 def study_of(folder, name, text):
     path = folder / f"{name}.toml"
-    path.write_text('rig = "mokhtar2017"\n' + text + LAW)
+    path.write_text('rig = "mokhtar2017"\n' + text + "\n" + LAW)
     return read_study(path, folder / f"{name}.zarr")
 
 
