@@ -18,6 +18,7 @@ from rubhpc.input.quantity import parse_quantity
 from rubhpc.input.reading import build
 from rubhpc.integrate.record import State
 from rubhpc.integrate.setup import prepare
+from rubhpc.models import chosen
 from rubhpc.recent import recent
 from rubhpc.rig.probes import Probe
 from rubhpc.rig.reading import packaged_name, read_rig, with_keys
@@ -142,7 +143,8 @@ def _assembled(
     drive: DriveLaw | None,
 ) -> Case:
     """Check and assemble all of a case but where it starts."""
-    rig = with_keys(rig, given.get("overrides") or {})
+    contact = _declared(Contact, given, caller)
+    rig = with_keys(rig, given.get("overrides") or {}).with_geometry(chosen("geometry", contact.model))
     speed, speed_ratio = given.get("speed"), given.get("speed_ratio")
     clearance, clearance_ratio = given.get("clearance"), given.get("clearance_ratio")
     if (speed is None) == (speed_ratio is None):
@@ -171,7 +173,6 @@ def _assembled(
     mu = parse_quantity(given.get("friction", FRICTION), "", f"{caller}: friction")
     if mu < 0:
         raise InputError(f"{caller}: friction: {mu:g} is out of range; it must be at least 0")
-    contact = _declared(Contact, given, caller)
     integrator = _declared(Integrator, given, caller)
     setup = recent(
         lambda: prepare(

@@ -33,12 +33,13 @@ def simulate(
     stiffness: float | str | None = None,
     damping: float | str | None = None,
     restitution: float | None = None,
-    friction_law: str = "sliding",
+    friction_law: str | None = None,
     static_friction_ratio: float | None = None,
     stribeck_speed: float | str | None = None,
     slip_speed: Sequence[float | str] | None = None,
     friction_ratio: Sequence[float] | None = None,
-    normal: str = "fixed",
+    normal: str | None = None,
+    model: str | None = None,
     method: str = "modal",
     step: float | str | None = None,
     accuracy: float = 1e-3,
@@ -80,7 +81,8 @@ def simulate(
     restitution : float, optional
         Normal velocity after an impact over that before it, 0 to 1; default none.
     friction_law : {"sliding", "coulomb", "stribeck", "table"}
-        Steady sliding; or set-valued with stick: Coulomb's law, Stribeck's, or a table over the slip speed.
+        Steady sliding (by default); or set-valued with stick: Coulomb's law, Stribeck's, or a table over the
+        slip speed.
     static_friction_ratio : float, optional
         Coefficient of friction at rest over that in sliding, 1 or more; of Coulomb's law by default 1.
     stribeck_speed : float (m/s) or str with a unit, optional
@@ -90,7 +92,10 @@ def simulate(
     friction_ratio : sequence of float, optional
         Coefficient at these slip speeds over `friction`; linear between them, constant beyond.
     normal : {"fixed", "updated"}
-        Contact normal along the stator's axis, or along the line of centres.
+        Contact normal along the stator's axis (by default), or along the line of centres.
+    model : {"mokhtar2017"}, optional
+        A published model: the fixed normal, sliding friction, and linear geometry of the stators that give
+        none.
     method : {"modal", "central-difference"}
         Integrator: the exact modal one, or the paper's.
     step : float (s) or str, optional

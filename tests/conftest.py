@@ -102,6 +102,7 @@ SLOW = (
     "running/",
     "signals/test_hilbert_huang.py",
     "signals/test_indicators.py::test_the_command_prints",
+    "storage/test_older_stores.py::test_it_is_read_as_ever",
     "storage/test_growth.py",
     "storage/test_shards.py",
     "storage/test_zarr_store.py::test_damaged_metadata_are_written_anew",

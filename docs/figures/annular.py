@@ -11,7 +11,7 @@ from postproc.figures.drawing import COLUMN_WIDTH, house_style, save
 from rubhpc.fem.annular import annular_rub
 
 PACKAGED = rubhpc.read_rig("mokhtar2017")
-RUB = {"speed_ratio": 1.5, "clearance_ratio": 0.8, "revolutions": 4}
+RUB = {"speed_ratio": 1.5, "clearance_ratio": 0.8, "revolutions": 4, "model": "mokhtar2017"}
 COUNTS = {12e9: (3, 4, 6, 8, 12, 16, 24, 32), 1e9: (3, 4, 6, 8, 12, 16)}
 
 

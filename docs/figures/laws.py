@@ -16,8 +16,9 @@ from postproc.figures.drawing import COLUMN_WIDTH, house_style, save
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-PACKAGED = rubhpc.read_rig("mokhtar2017")
+PACKAGED = rubhpc.read_rig("mokhtar2017").with_geometry("linear")
 RUB = {"speed_ratio": 0.75, "clearance": "84 um", "friction": 0.3, "transient": 40, "revolutions": 2}
+LAWS = {"normal": "fixed", "friction_law": "sliding"}
 STIFFNESS = (1e6, 3e6, 1e7, 3e7, 1e8, 3e8, 1e9, 3e9)  # N/m; the stator's own is 1.875e6
 SHOWN = (1e6, 1e7, 1e8)
 SIGNALS = {"vertical": "vertical", "torsion": "torsion", "contact_force": "contact force"}
@@ -56,11 +57,10 @@ def forces(ax: Axes, known: rubhpc.Record, found: dict[float, rubhpc.Record]) ->
 def whip(ax: Axes) -> Axes:
     """Largest deflection of each revolution, three stators 120 degrees apart, under both laws of friction."""
     ring = replace(PACKAGED, stator=(replace(PACKAGED.stator[0], count=3),))
-    given = RUB | {"clearance": "60 um", "transient": 0, "keep": "waveform"}
+    given = RUB | LAWS | {"clearance": "60 um", "transient": 0, "keep": "waveform"}
     coulomb = rubhpc.simulate(
         ring,
-        **(given | {"revolutions": 24}),
-        friction_law="coulomb",
+        **(given | {"revolutions": 24, "friction_law": "coulomb"}),
         method="central-difference",
         step="2 us",
     )
@@ -88,9 +88,9 @@ def whip(ax: Axes) -> Axes:
 
 def draw() -> None:
     """Draw and save the figure."""
-    known = rubhpc.simulate(PACKAGED, **RUB, samples_per_revolution=1024)
+    known = rubhpc.simulate(PACKAGED, **RUB, **LAWS, samples_per_revolution=1024)
     found = {
-        k: rubhpc.simulate(PACKAGED, **RUB, samples_per_revolution=1024, law="penalty", stiffness=k)
+        k: rubhpc.simulate(PACKAGED, **RUB, **LAWS, samples_per_revolution=1024, law="penalty", stiffness=k)
         for k in STIFFNESS
     }
     with house_style():

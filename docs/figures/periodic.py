@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 SPRINGS = rubhpc.LumpedStator(node=8, radius=0.06, count=8, mass=1e-3, damping=2.0, stiffness=1e5)
 RIG = replace(rubhpc.read_rig("mokhtar2017"), stator=(SPRINGS,))
-CASE = {"clearance": "300 um", "friction": 0.0, "keep": ()}
+CASE = {"clearance": "300 um", "friction": 0.0, "keep": (), "model": "mokhtar2017"}
 NEAR, PAST = 1.335, 1.345  # speed ratios before and after the fold
 Branch = list[tuple[float, rubhpc.PeriodicMotion]]
 

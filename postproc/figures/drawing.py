@@ -106,7 +106,7 @@ class Drawing:
     lines : tuple of str
         What the figure command prints before it draws.
     verdict : tuple of str
-        What the caption says of a single case besides (`postproc.cases.maps.verdict_of`).
+        What the caption says besides: of a single case `postproc.cases.maps.verdict_of`, of a map its model.
     files : mapping of Path to Dataset
         Further data that the options ask to write.
     """

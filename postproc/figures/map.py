@@ -15,6 +15,7 @@ from postproc.figures.scatter import scatter_maps
 from postproc.figures.small_multiples import color_bar, legend_below, name_facets, write_over
 from postproc.store.axes import drawn_axes, source
 from postproc.store.open import open_store
+from postproc.store.rig_of_case import model_of
 from postproc.store.select import first_of_rest, worst_of_stators
 from postproc.store.units import displayed
 from postproc.store.variables import require_variables
@@ -93,6 +94,7 @@ def map(  # noqa: A001 - the name of the command
         cases = worst_of_stators(cases, [value])
     cases, notes = first_of_rest(cases, [*spread, *facets], value)
     shown = map_data(cases, value, spread, facets)
+    model = tuple(filter(None, model_of(cases).split(", ")))
     marked = None if events is None else events_at(open_store(events), shown, across, up)
 
     def draw(axes: list[Axes]) -> None:
@@ -110,7 +112,7 @@ def map(  # noqa: A001 - the name of the command
             )
 
     if not facets:
-        return Drawing(shown=shown, draw=draw, height=75.0, lines=tuple(notes))
+        return Drawing(shown=shown, draw=draw, height=75.0, lines=tuple(notes), verdict=model)
     n_row, n_column = ([1] + [shown.sizes[axis] for axis in facets])[-2:]
     return Drawing(
         shown=shown,
@@ -119,6 +121,7 @@ def map(  # noqa: A001 - the name of the command
         height=30.0 + 45.0 * n_row,
         width=180.0,
         lines=tuple(notes),
+        verdict=model,
     )
 
 

@@ -14,6 +14,7 @@ from postproc.cases.sobol import drawn_ranges
 from postproc.report.grid import plain
 from postproc.store.attributes import table_of
 from postproc.store.axes import axes_of, drawn_axes
+from postproc.store.rig_of_case import model_of
 from postproc.store.units import short_name
 from rubhpc.integrate.record import MOST_RESIDUAL
 from rubhpc.rig.probes import Probe
@@ -166,7 +167,8 @@ def drawn_rows(store: xr.Dataset) -> list[dict[str, str]]:
 
 def study_rows(store: xr.Dataset) -> list[tuple[str, str]]:
     """Return how speed, contact, integration and recording were set, from the attributes of the store."""
-    return setting_rows(table_of(store, "study"))
+    model = model_of(store).removeprefix("model ")
+    return [("Model", model)] * bool(model) + setting_rows(table_of(store, "study"))
 
 
 def run_rows(store: xr.Dataset, measures: Measures) -> list[tuple[str, str]]:

@@ -9,8 +9,9 @@ import xarray as xr
 from postproc.store.attributes import MEASURED, table_of
 from postproc.store.axes import source
 from rubhpc.errors import InputError
+from rubhpc.models import ABSENT, in_words
 from rubhpc.rig.reading import rig_from_dict, with_keys
-from rubhpc.rig.stators import Stator
+from rubhpc.rig.stators import Stator, geometries
 from rubhpc.study.axes import coordinate_of, is_of_table
 
 if TYPE_CHECKING:
@@ -51,6 +52,19 @@ def rig_of(case: xr.Dataset, values: Mapping[str, float] | None = None) -> Rig:
     }
     chosen |= values or {}
     return with_keys(rig, {key: chosen[dim] for dim, key in rig_axes(case).items() if dim in chosen})
+
+
+def model_of(store: xr.Dataset) -> str:
+    """Return the normal, friction law and geometry of stators that a study uses, in words; "" without one."""
+    study = table_of(store, "study")
+    if "contact" not in study or not table_of(store, "rig"):
+        return ""
+    contact, grid = ABSENT | study["contact"], study.get("grid", {})
+    normals, laws = (
+        [str(word) for word in grid.get(f"contact.{key}", {}).get("values", [contact[key]])]
+        for key in ("normal", "friction_law")
+    )
+    return in_words(normals, laws, geometries(rig_from_dict(table_of(store, "rig")).stator))
 
 
 def natural_frequencies(case: xr.Dataset, along: str | None = None) -> dict[str, xr.DataArray]:

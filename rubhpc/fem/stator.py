@@ -10,7 +10,7 @@ import numpy as np
 
 from rubhpc.fem.beam import STATOR_DEGREES, join, rayleigh_coefficients, stator_element, stator_foreshortening
 from rubhpc.fem.model import Body, StatorModel
-from rubhpc.rig.stators import SECOND_ORDER, LumpedStator, MatrixStator, Stator
+from rubhpc.rig.stators import LumpedStator, MatrixStator, Stator
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -53,7 +53,7 @@ def _(stator: Stator, radius: float) -> StatorModel:
         gyroscopic=beam.gyroscopic[rows],
         length=stator.length,
         euler_load=stator.euler_load,
-        squared_slope=stator_foreshortening(stator)[rows] if stator.geometry == SECOND_ORDER else None,
+        squared_slope=stator_foreshortening(stator)[rows] if stator.is_bent else None,
     )
 
 

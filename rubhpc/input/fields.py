@@ -359,9 +359,11 @@ def text(*, doc: str, example: str, default: Any = MISSING) -> Any:
     return _declare("text", doc, example, default)
 
 
-def choice(*, of: tuple[str, ...], doc: str, example: str, default: str, added: bool = False) -> Any:
-    """Declare a field that holds one word of a list; `added`: rigs of older stores have no such key."""
-    return _declare("choice", doc, example, default, of=of, added=added)
+def choice(
+    *, of: tuple[str, ...], doc: str, example: str, default: str | None, absent: str | None = None
+) -> Any:
+    """Declare a field that holds one word of a list; `absent`: what it means that a stored rig lacks it."""
+    return _declare("choice", doc, example, default, of=of, added=absent is not None, absent=absent)
 
 
 def choices(*, of: tuple[str, ...], doc: str, example: str, default: tuple[str, ...]) -> Any:

@@ -111,15 +111,17 @@ def refuse_unknown(table: Mapping[str, object], known: Mapping[str, object], fil
 def plain(value: Any) -> Any:
     """Return a dataclass as dicts, lists, numbers and text, which `build` reads back.
 
-    A field with `added` among its metadata is omitted at its default, as rigs of older stores have no such
-    key; one with `derived`, which is no key, always.
+    A field with `added` among its metadata is omitted at its default, or at what is meant where it is
+    `absent`, as rigs of older stores have no such key; one with `derived`, which is no key, always.
     """
     if not dataclasses.is_dataclass(value):
         return [plain(v) for v in value] if isinstance(value, tuple) else value
     result: dict[str, Any] = {}
     for declared in dataclasses.fields(value):
         limits, entry = declared.metadata, getattr(value, declared.name)
-        if entry is None or limits.get("derived") or (limits.get("added") and entry == declared.default):
+        if entry is None or limits.get("derived"):
+            continue
+        if limits.get("added") and entry == (limits.get("absent") or declared.default):
             continue
         kind = limits.get("kind")
         result[key_of(declared)] = KINDS[kind].encode(entry) if kind else plain(entry)

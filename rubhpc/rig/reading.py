@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from rubhpc.errors import InputError, RubError
 from rubhpc.input.messages import brief, nearest, place
 from rubhpc.input.reading import build, read_toml, replace_keys
+from rubhpc.models import ABSENT
 from rubhpc.rig.rig import Rig
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ PACKAGED = Path(__file__).parents[1] / "rigs"
 
 def rig_from_dict(table: Mapping[str, Any], where: str = "rig") -> Rig:
     """Return the rig that `Rig.as_dict` described; `where` starts error messages."""
-    return build(Rig, table, where)
+    return build(Rig, table, where).with_geometry(ABSENT["geometry"])
 
 
 def packaged_rigs() -> list[str]:

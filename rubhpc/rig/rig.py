@@ -12,11 +12,12 @@ from rubhpc.input.fields import FieldError, check_fields, parse_field, table, te
 from rubhpc.input.messages import nearest
 from rubhpc.input.quantity import parse_quantity
 from rubhpc.input.reading import plain
+from rubhpc.models import default_of
 from rubhpc.rig.carriers import AnyCarrier
 from rubhpc.rig.parts import FIXED_AT_NODE_1, Torsion
 from rubhpc.rig.ross import rotor_from_ross
 from rubhpc.rig.rotors import UNLOADED, AnyRotor, MatrixRotor
-from rubhpc.rig.stators import AnyStator, single_stators
+from rubhpc.rig.stators import AnyStator, Stator, single_stators
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -222,9 +223,17 @@ class Rig:
         """Contact radius of a stator, m: its own, or that of the largest disc at its node."""
         return stator.radius if stator.radius is not None else self.rotor.rim_radius(stator.node)
 
+    def with_geometry(self, geometry: str) -> Rig:
+        """Return the rig with a geometry of the beam stators that give none."""
+        stators = tuple(
+            replace(one, geometry=geometry) if isinstance(one, Stator) and one.geometry is None else one
+            for one in self.stator
+        )
+        return self if stators == self.stator else replace(self, stator=stators)
+
     def as_dict(self) -> dict[str, Any]:
         """Return the rig as plain dicts, lists, numbers and text, for JSON."""
-        result: dict[str, Any] = plain(self)
+        result: dict[str, Any] = plain(self.with_geometry(default_of("geometry")))
         return result
 
 

@@ -21,11 +21,11 @@ from rubhpc.input.fields import (
     text,
     words,
 )
+from rubhpc.models import LINEAR, SECOND_ORDER, default_of
 from rubhpc.rig.matrix_body import check_body, checked_matrices
 from rubhpc.rig.parts import MOST_ELEMENTS, UNDAMPED, Damping
 from rubhpc.units import typed_quantity
 
-LINEAR, SECOND_ORDER = "linear", "second_order"
 MOST_STATORS = 62  # a contact mode is numbered by the bits of an integer
 
 
@@ -112,13 +112,13 @@ class Stator(Seat):
         doc="Whether the stator bends in the tangential direction.", example="true", default=True
     )
     damping: Damping = table(doc="Rayleigh damping.", default=UNDAMPED)
-    geometry: str = choice(
+    geometry: str | None = choice(
         doc="Whether a stator that bends keeps its length along its axis (linear), or its tip draws back and "
-        "an axial force lowers its lateral stiffness (second_order).",
+        f"an axial force lowers its lateral stiffness (second_order); by default {default_of('geometry')}.",
         example='"second_order"',
         of=(LINEAR, SECOND_ORDER),
-        default=LINEAR,
-        added=True,
+        default=None,
+        absent=LINEAR,
     )
 
     def __post_init__(self) -> None:
@@ -129,12 +129,14 @@ class Stator(Seat):
                 raise FieldError(name, f'missing; add {name} = "5 mm", or diameter for a round stator')
             if side is not None and self.diameter is not None:
                 raise FieldError(name, "conflicts with diameter; remove one of them")
-        if self.geometry == SECOND_ORDER and not self.lateral:
-            problem = "a stator with lateral = false does not bend"
-            raise FieldError("geometry", f'{problem}; set lateral = true, or geometry = "linear"')
         if self.geometry == SECOND_ORDER and self.carrier is not None:
             problem = "second_order needs a stator on the ground, and this one stands on a carrier"
             raise FieldError("geometry", f'{problem}; set geometry = "linear", or remove carrier')
+
+    @property
+    def is_bent(self) -> bool:
+        """Whether its gap knows that it bends: second order of a stator that is free to."""
+        return self.lateral and (self.geometry or default_of("geometry")) == SECOND_ORDER
 
     @property
     def carrier_problem(self) -> str:
@@ -269,9 +271,10 @@ class MatrixStator(Seat):
 AnyStator: TypeAlias = Stator | LumpedStator | MatrixStator
 
 
-def has_bent_stator(stators: tuple[AnyStator, ...]) -> bool:
-    """Whether the gap of a stator knows that it bends."""
-    return any(isinstance(stator, Stator) and stator.geometry == SECOND_ORDER for stator in stators)
+def geometries(stators: tuple[AnyStator, ...]) -> tuple[str, ...]:
+    """Return which geometries beam stators have, each once."""
+    beams = [stator for stator in stators if isinstance(stator, Stator)]
+    return tuple(dict.fromkeys(SECOND_ORDER if stator.is_bent else LINEAR for stator in beams))
 
 
 def gap_problem(stators: tuple[AnyStator, ...], clearance: float, *, is_ratio: bool = False) -> str:

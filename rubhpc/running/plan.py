@@ -203,6 +203,7 @@ class Plan:
                 f"{grid.study.title} -> {grid.study.output}",
                 f"cases       {n_case} = {self._sizes}",
                 *(f"            {text}" for text in axis_ranges(grid)),
+                f"contact     {grid.study.model}",
                 f"blocks      {n_block}, at most {math.prod(grid.chunk)} cases each; {idle}",
                 f"store       {_size(n_case * (per_case + 2 * _LINE))} before compression, {files}",
                 *([f"memory      {_size(self.memory)} a process, about{compiled}"] if self.memory else []),

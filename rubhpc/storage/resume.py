@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rubhpc.errors import StoreError
+from rubhpc.models import ABSENT, MODELS, default_of
 from rubhpc.schema import DIVERGED, DONE
 from rubhpc.storage.growth import finish_growth, grow
 from rubhpc.storage.lock import remove_drafts
@@ -35,6 +36,11 @@ if TYPE_CHECKING:
     from rubhpc.study.cases import Block
     from rubhpc.study.study import Study
 
+_AS_KEY = {
+    "normal": '[contact] normal = "{}"',
+    "friction_law": '[contact] friction_law = "{}"',
+    "geometry": '[override] "stator.geometry" = "{}"',
+}
 _MOST = 3  # differences of a subject that are shown
 
 
@@ -84,6 +90,23 @@ def is_other_version(stored: Manifest, asked: Manifest) -> bool:
     )
 
 
+def what_to_add(stored: Manifest, asked: Manifest) -> str:
+    """Return the keys with whose defaults a store was made, where nothing else keeps a study out of it.
+
+    "" where something does, or the study has keys of its own that differ.
+    """
+    leaves = [leaf for leaf in _leaves(stored.parts, asked.parts) if leaf[1] != leaf[2]]
+    other = {key.rpartition(".")[2]: (mine, yours) for key, mine, yours in leaves if key != "physics"}
+    if any(key not in ABSENT or yours != default_of(key) for key, (_, yours) in other.items()):
+        return ""
+    made_with = ABSENT | stored.parts["contact"] | {key: mine for key, (mine, _) in other.items()}
+    model = next((n for n, keys in MODELS.items() if keys.items() <= made_with.items()), "")
+    if other and model:
+        return f'[contact] model = "{model}"'
+    keys = (_AS_KEY[key].format(mine) for key, (mine, _) in other.items())
+    return " and ".join(keys)
+
+
 def _by_subject(leaves: list[tuple[str, Any, Any]]) -> list[str]:
     """Texts of a few leaves of each subject, such as rig.rotor, and how many more there are."""
     subjects: dict[str, list[tuple[str, Any, Any]]] = {}
@@ -125,7 +148,8 @@ def _leaves(mine: Any, yours: Any, key: str = "") -> list[tuple[str, Any, Any]]:
             for i, pair in enumerate(zip(mine, yours, strict=True), 1)
             for leaf in _leaves(*pair, f"{key}.{i}" if key else str(i))
         ]
-    return [(key, mine, yours)]
+    meant = ABSENT.get(key.rpartition(".")[2])  # where a store lacks the key
+    return [(key, meant if mine is None else mine, meant if yours is None else yours)]
 
 
 def _short(value: Any) -> str:
@@ -163,12 +187,14 @@ def _refuse_other(mine: Manifest, yours: Manifest, path: Path, *, accept_version
     if not found or (is_version and accept_version):
         return
     listed = "; ".join(found)
+    added = what_to_add(mine, yours)
+    advice = f"add {added} to the study, or choose" if added else "choose"
     if is_version:
         raise StoreError(
             f"{path}: was computed by another version of the physics: {listed}; "
             "--accept-version keeps its cases and continues, another --output starts a new store"
         )
-    raise StoreError(f"{path}: is the store of another study: {listed}; choose another --output")
+    raise StoreError(f"{path}: is the store of another study: {listed}; {advice} another --output")
 
 
 def open_store(grid: CaseGrid) -> Store:

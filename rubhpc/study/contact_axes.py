@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 
 PREFIX = "contact."
 _FIELDS: dict[str, Field[Any]] = {
-    PREFIX + declared.name: declared for declared in fields(Contact) if declared.metadata["kind"] != "series"
+    PREFIX + declared.name: declared
+    for declared in fields(Contact)
+    if declared.metadata["kind"] != "series" and declared.name != "model"
 }
 
 
@@ -54,6 +56,13 @@ def choices_of(name: str) -> tuple[str, ...]:
     """Return the words that values 0, 1, ... on an axis stand for; () where they are quantities."""
     found: tuple[str, ...] = _FIELDS[name].metadata.get("of", ()) if name in _FIELDS else ()
     return found
+
+
+def laws_of(stated: ContactKeys, axes: Sequence[Tried], key: str) -> list[str]:
+    """Return the laws that the cases of a study take, by a key of [contact]."""
+    words = choices_of(PREFIX + key)
+    on_axis = [words[int(value)] for axis in axes if axis.name == PREFIX + key for value in axis.tried]
+    return on_axis or [getattr(stated, key)]
 
 
 def contact_at(stated: ContactKeys, values: Mapping[str, float]) -> Contact:

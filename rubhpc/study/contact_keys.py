@@ -1,4 +1,4 @@
-"""The table [contact] of a study: laws of contact and friction, and the direction of the normal."""
+"""The table [contact] of a study: laws of contact and friction, direction of the normal, published models."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, TypedDict
 
 from rubhpc.input.fields import FieldError, check_fields, choice, quantity, series
+from rubhpc.models import MODELS, chosen, default_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -60,10 +61,11 @@ class ContactKeys:
     )
     friction_law: str = choice(
         doc="Friction law: steady sliding in the sense of the spin; or, with stick, Coulomb's law, "
-        "Stribeck's, whose coefficient decays with the slip speed, or a table over the slip speed.",
+        "Stribeck's, whose coefficient decays with the slip speed, or a table over the slip speed; "
+        f"by default {default_of('friction_law')}.",
         example='"coulomb"',
         of=tuple(CLOSED_FORM),
-        default="sliding",
+        default=None,
     )
     static_friction_ratio: float | None = quantity(
         "",
@@ -94,14 +96,29 @@ class ContactKeys:
         at_least=0,
     )
     normal: str = choice(
-        doc="Contact normal: along the axis of the stator, or along the line of centres.",
+        doc="Contact normal: along the axis of the stator (fixed), or along the line of centres (updated); "
+        f"by default {default_of('normal')}.",
         example='"updated"',
         of=("fixed", "updated"),
-        default="fixed",
+        default=None,
+    )
+    model: str | None = choice(
+        doc="A published model: the fixed normal, sliding friction, and linear geometry of the stators that "
+        "give none.",
+        example='"mokhtar2017"',
+        of=tuple(MODELS),
+        default=None,
     )
 
     def __post_init__(self) -> None:
         check_fields(self)
+        for key in ("normal", "friction_law"):
+            given = getattr(self, key)
+            if given is None:
+                object.__setattr__(self, key, chosen(key, self.model))
+            elif self.model is not None and given != (meant := chosen(key, self.model)):
+                problem = f'"{given}" conflicts with model = "{self.model}", which has "{meant}"'
+                raise FieldError(key, f"{problem}; remove one of them")
 
     @property
     def is_smooth(self) -> bool:
@@ -123,12 +140,13 @@ class ContactArguments(TypedDict, total=False):
     stiffness: float | str | None
     damping: float | str | None
     restitution: float | None
-    friction_law: str
+    friction_law: str | None
     static_friction_ratio: float | None
     stribeck_speed: float | str | None
     slip_speed: Sequence[float | str] | None
     friction_ratio: Sequence[float] | None
-    normal: str
+    normal: str | None
+    model: str | None
 
 
 @dataclass(frozen=True, kw_only=True)

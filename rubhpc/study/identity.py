@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from rubhpc.input.reading import plain
 from rubhpc.rig.reading import with_keys
-from rubhpc.rig.stators import has_bent_stator
 from rubhpc.study import contact_axes, initial
 from rubhpc.study.axes import (
     DRIVE_AXES,
@@ -71,7 +70,7 @@ def physics_of(study: Study) -> int:
 
 def _is_curved(study: Study) -> bool:
     """Whether a stator is bent, or any case has a normal that turns."""
-    return has_bent_stator(study.rig.stator) or "updated" in _laws(study, "normal")
+    return study.has_bent_stator or "updated" in _laws(study, "normal")
 
 
 def _bounces(study: Study) -> bool:
@@ -90,10 +89,7 @@ def _has_many_events(study: Study) -> bool:
 
 def _laws(study: Study, key: str) -> set[str]:
     """Return the laws that the cases take, by a key of [contact]."""
-    name = contact_axes.PREFIX + key
-    words = contact_axes.choices_of(name)
-    on_axis = {words[int(value)] for axis in study.axes if axis.name == name for value in axis.tried}
-    return on_axis or {getattr(study.contact, key)}
+    return set(contact_axes.laws_of(study.contact, study.axes, key))
 
 
 def identity_parts(study: Study) -> dict[str, Any]:
@@ -110,6 +106,7 @@ def identity_parts(study: Study) -> dict[str, Any]:
         _blank(rig, key.split("."))
     del rig["name"]
     contact = {k: v for k, v in asdict(study.contact).items() if v is not None or k in _ALWAYS}
+    contact.pop("model", None)  # its keys are there
     contact |= {
         axis.name.removeprefix(contact_axes.PREFIX): _AXIS for axis in study.axes if axis.is_contact_key
     }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +14,9 @@ from rubhpc.fem.probes import with_probes
 from rubhpc.input.messages import brief, nearest, place, quoted
 from rubhpc.input.quantity import parse_quantity
 from rubhpc.input.reading import build, plain, read_toml, refuse_unknown
+from rubhpc.models import SECOND_ORDER, chosen, in_words
 from rubhpc.rig.reading import read_rig, with_keys
-from rubhpc.rig.stators import gap_problem, has_bent_stator
+from rubhpc.rig.stators import gap_problem, geometries
 from rubhpc.schema import VARIABLES
 from rubhpc.study import contact_axes
 from rubhpc.study.axes import (
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
 
     from rubhpc.rig.probes import Probe
     from rubhpc.rig.rig import Rig
+    from rubhpc.rig.stators import AnyStator
 
 
 def line_of_text(table: dict[str, Any], key: str, default: str, file: str) -> str:
@@ -230,8 +232,7 @@ _TABLES = (
 _MOST_AXES = 32  # arrays have 64 dimensions at most
 
 
-DEFAULT_CONTACT, DEFAULT_INITIAL, DEFAULT_INTEGRATOR, DEFAULT_RECORDING, DEFAULT_RUN = (
-    Contact(),
+DEFAULT_INITIAL, DEFAULT_INTEGRATOR, DEFAULT_RECORDING, DEFAULT_RUN = (
     Initial(),
     Integrator(),
     Recording(),
@@ -248,7 +249,7 @@ class Study:
     title : str
         For people.
     rig : Rig
-        With the study's overrides applied.
+        With the study's overrides applied, and the geometry of every beam stator stated.
     axes : tuple of Axis
         The cases are the Cartesian product of their dimensions, the last one running fastest. An axis that is
         swept in both directions adds a last one, `direction`.
@@ -285,7 +286,7 @@ class Study:
     branch: BranchKeys | None = None
     run_up: RunUpKeys | None = None
     drive: DriveKeys | None = None
-    contact: ContactKeys = DEFAULT_CONTACT
+    contact: ContactKeys = field(default_factory=Contact)
     initial: Initial = DEFAULT_INITIAL
     integrator: Integrator = DEFAULT_INTEGRATOR
     recording: Recording = DEFAULT_RECORDING
@@ -297,6 +298,7 @@ class Study:
         if not self.output.name:  # "/" or "."
             problem = f"{brief(str(self.output))} does not name a store"
             raise InputError(f'output: {problem}; write output = "my_study.zarr", or another path')
+        object.__setattr__(self, "rig", self.rig.with_geometry(chosen("geometry", self.contact.model)))
         if any(axis.sweep == BOTH for axis in self.axes) and self.axes[-1].name != DIRECTION:
             object.__setattr__(self, "axes", (*self.axes, direction_axis()))
         if self.initial.is_from_store:
@@ -319,12 +321,29 @@ class Study:
                 self.integrator,
                 self.recording,
                 is_sampled=self.sample is not None,
-                is_bent=has_bent_stator(self.rig.stator),
+                is_bent=self.has_bent_stator,
             )
         check_rigs(self.rig, self.axes, self.recording.probe)
-        if has_bent_stator(self.rig.stator):
+        if self.has_bent_stator:
             for contact in contacts:
                 check_bent(contact, self.integrator)
+
+    @property
+    def has_bent_stator(self) -> bool:
+        """Whether the gap of a stator knows that it bends, in any case."""
+        return SECOND_ORDER in geometries(self._freest_stators)
+
+    @property
+    def model(self) -> str:
+        """The normal, friction law and geometry of stators that its cases use, in words."""
+        normals, laws = (contact_axes.laws_of(self.contact, self.axes, k) for k in ("normal", "friction_law"))
+        return in_words(normals, laws, geometries(self._freest_stators))
+
+    @property
+    def _freest_stators(self) -> tuple[AnyStator, ...]:
+        """The stators, free to bend where they are in some cases."""
+        freest = {a.name: max(a.tried) for a in self.axes if a.is_rig_key and a.name.endswith(".lateral")}
+        return with_keys(self.rig, freest).stator
 
     @property
     def changes_speed(self) -> bool:

@@ -72,15 +72,18 @@ class Integrator:
 
 
 def check_bent(contact: Contact, integrator: Integrator) -> None:
-    """Refuse laws and integrators that do not know a stator of the second order.
+    """Refuse laws and integrators that do not know a stator of second-order geometry.
 
     Raises
     ------
     InputError
         Says what it needs instead.
     """
+    if integrator.method != "modal":
+        problem = f"{integrator.method} needs stators of linear geometry"
+        fix = 'add [contact] model = "mokhtar2017", or [override] "stator.geometry" = "linear"'
+        raise InputError(f"[integrator] method: {problem}; {fix}")
     needed = {
-        '[integrator] method = "modal"': integrator.method == "modal",
         '[contact] law = "lagrange"': contact.law == "lagrange",
         '[contact] friction_law = "sliding"': contact.friction_law == "sliding",
     }

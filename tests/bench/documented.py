@@ -15,11 +15,12 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from closed_form import read_rig, simulate
 from test_laws import ROWS
 
 from postproc.signals import contacts
 from postproc.signals.hilbert_huang import hilbert_huang, median_frequency
-from rubhpc import LumpedStator, read_rig, simulate
+from rubhpc import LumpedStator
 from rubhpc.integrate.periodic_motions.proof import Solver
 from rubhpc.rig.reading import with_keys
 from rubhpc.schema import DONE, REGIME

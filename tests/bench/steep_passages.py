@@ -14,6 +14,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from closed_form import Contact
 
 TESTS = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(TESTS / "integrate" / "changing_speed"), str(TESTS / "support")]
@@ -33,7 +34,7 @@ from rubhpc.integrate.changing_speed.case import record_run_up  # noqa: E402
 from rubhpc.integrate.setup import prepare  # noqa: E402
 from rubhpc.study.initial import CONTACT_FREE, Initial  # noqa: E402
 from rubhpc.study.speed_law import SpeedLaw  # noqa: E402
-from rubhpc.study.study import Contact, Integrator, Recording  # noqa: E402
+from rubhpc.study.study import Integrator, Recording  # noqa: E402
 from rubhpc.threads import on_one_thread  # noqa: E402
 
 STEADY = 5  # constant speeds

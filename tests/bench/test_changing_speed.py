@@ -6,15 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import Contact, read_rig
 from overhung_pump import SEGMENT, pump
 
-from rubhpc import LumpedStator, read_rig
+from rubhpc import LumpedStator
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.changing_speed.case import record_run_up
 from rubhpc.integrate.setup import prepare
 from rubhpc.study.initial import CONTACT_FREE, Initial
 from rubhpc.study.speed_law import SpeedLaw
-from rubhpc.study.study import Contact, Integrator, Recording
+from rubhpc.study.study import Integrator, Recording
 from rubhpc.threads import on_one_thread
 
 pytestmark = pytest.mark.bench

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import Contact, read_rig
 
-from rubhpc import read_rig
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import with_keys
-from rubhpc.study.study import Contact, Integrator, Recording
+from rubhpc.study.study import Integrator, Recording
 from rubhpc.threads import on_one_thread
 
 pytestmark = pytest.mark.bench

@@ -6,8 +6,8 @@ import time
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from closed_form import branch, periodic, simulate
 
-from rubhpc import branch, periodic, simulate
 from rubhpc.integrate.periodic_motions import solved_motion
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ STUDIES = (
     "branches/chaos",
 )
 WORST = 1.5  # times as much or as little
-FRICTION = 'friction_law = "coulomb"'
+FRICTION, SLIDING = 'friction_law = "coulomb"', 'friction_law = "sliding"'
 SMALL = """
 title = "Small"
 rig = "{rig}"
@@ -33,17 +33,20 @@ speed_ratio = {{ start = 0.8, stop = 3.0, step = 0.2 }}
 clearance_ratio = [0.5, 0.7, 0.9]
 friction = [0.1, 0.3]
 [contact]
+normal = "fixed"
 {contact}
+[override]
+"stator.geometry" = "linear"
 [record]
 transient = 60
 revolutions = 32
 """
 CONTACTS = {
     "coulomb": FRICTION,
-    "restitution": "restitution = 0.5",
+    "restitution": SLIDING + "\nrestitution = 0.5",
     "both": FRICTION + "\nrestitution = 0.5",
-    "penalty": 'law = "penalty"\nstiffness = 1e7',
-    "ring of 8": "",
+    "penalty": SLIDING + '\nlaw = "penalty"\nstiffness = 1e7',
+    "ring of 8": SLIDING,
 }
 
 

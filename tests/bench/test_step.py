@@ -1,11 +1,11 @@
 """Time of a step. One core is meant; on a busy machine the least of several rounds counts."""
 
 import pytest
+from closed_form import Contact, read_rig
 
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.setup import prepare
-from rubhpc.rig.reading import read_rig
-from rubhpc.study.study import Contact, Integrator, Recording
+from rubhpc.study.study import Integrator, Recording
 
 pytestmark = pytest.mark.bench
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from closed_form import Contact, read_rig, simulate
 from rivals import STEP
 from rivals import run as run_rival
 
@@ -16,8 +17,8 @@ from rubhpc.integrate import tangent_motion
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.marches import event_driven as event_driven_march
 from rubhpc.integrate.setup import prepare
-from rubhpc.rig.reading import read_rig, with_keys
-from rubhpc.study.study import Contact, Integrator, Recording
+from rubhpc.rig.reading import with_keys
+from rubhpc.study.study import Integrator, Recording
 
 pytestmark = pytest.mark.bench
 
@@ -81,7 +82,7 @@ def test_modal_case_against_what_else_there_is(benchmark, capsys, name):
     off = error(case(setup, beginning).vertical, exact)
     seconds, _ = benchmark.pedantic(lambda: least(lambda: case(setup, usual), 20), rounds=1)
     rows["modal, set-up shared by a study"] = seconds / whole, off
-    seconds, _ = least(lambda: rubhpc.simulate(rig, speed=speed, clearance=clearance, friction=FRICTION), 5)
+    seconds, _ = least(lambda: simulate(rig, speed=speed, clearance=clearance, friction=FRICTION), 5)
     rows["modal, one rubhpc.simulate"] = seconds / whole, off
 
     central = set_up(rig, speed, method="central-difference", step=STEP)

@@ -210,6 +210,7 @@ def test_the_python_face(tmp_path: Path):
         speed=float(case.spin_speed),
         clearance=float(case.clearance),
         friction=0.5,
+        model="mokhtar2017",
         transient=1,
         revolutions=2,
         samples_per_revolution=32,

@@ -18,6 +18,8 @@ rig = "mokhtar2017"
 clearance = { start = "112 um", stop = "124 um" }
 speed_ratio = [0.73, 0.74, 0.75, 0.76]
 friction = 0.3
+[contact]
+model = "mokhtar2017"
 [branch]
 along = "clearance"
 periods = [1, 2]
@@ -37,6 +39,8 @@ stop = "1500 rpm"
 "run_up.time" = ["0.3 s", "0.5 s", "1.5 s"]
 clearance = ["100 um", "120 um", "5 mm"]
 friction = [0.1, 0.2]
+[contact]
+model = "mokhtar2017"
 [record]
 samples_per_revolution = 32
 [[record.probe]]
@@ -56,7 +60,10 @@ inertia = "0.02 kg m^2"
 clearance = ["60 um", "100 um", "5 mm"]
 friction = [0.1, 0.2]
 [contact]
+normal = "fixed"
 friction_law = "coulomb"
+[override]
+"stator.geometry" = "linear"
 [record]
 samples_per_revolution = 64
 [run]
@@ -68,6 +75,8 @@ rig = "mokhtar2017"
 speed_ratio = { start = 0.9, stop = 2.0, num = 9 }
 clearance_ratio = [0.7, 0.85]
 friction = { start = 0.0, stop = 0.4, num = 9 }
+[contact]
+model = "mokhtar2017"
 [refine]
 coarse = 4
 [record]

@@ -5,6 +5,7 @@ import math
 import matplotlib as mpl
 import numpy as np
 import pytest
+from closed_form import read_rig
 from matplotlib.figure import Figure
 from scipy.linalg import eigvals
 
@@ -14,7 +15,6 @@ from rubhpc.fem.critical_speeds import campbell, critical_speeds
 from rubhpc.fem.modes import modes
 from rubhpc.fem.rotor import assemble_rotor
 from rubhpc.rig.parts import Bearing, Disc, ShaftSection, Torsion
-from rubhpc.rig.reading import read_rig
 from rubhpc.rig.rotors import Rotor
 
 

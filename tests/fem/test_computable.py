@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import pytest
+from closed_form import read_rig
 
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.modes import modes
-from rubhpc.rig.reading import read_rig, rig_from_dict, with_keys
+from rubhpc.rig.reading import rig_from_dict, with_keys
 
 
 @pytest.mark.parametrize(

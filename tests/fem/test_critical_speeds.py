@@ -6,11 +6,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from closed_form import read_rig
 from scipy.linalg import eigvals
 from scipy.optimize import brentq
 from trial_rig import trial_rig
 
-from rubhpc import Rig, Unbalance, assemble, read_rig
+from rubhpc import Rig, Unbalance, assemble
 from rubhpc.fem.critical_speeds import campbell, critical_speeds, find_critical_speeds
 from rubhpc.fem.linear_design import linear_design
 from rubhpc.rig.bearing_table import BearingTable

@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 import pytest
+from closed_form import read_rig
 
-from rubhpc import assemble, read_rig
+from rubhpc import assemble
 from rubhpc.fem.modes import modes
 from rubhpc.fem.stability import stator_names, undamped, undamped_message
 from rubhpc.rig.reading import PACKAGED, with_keys

@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import read_rig
 from trial_rig import trial_rig
 
 import rubhpc
-from rubhpc import InputError, Rig, Unbalance, assemble, read_rig
+from rubhpc import InputError, Rig, Unbalance, assemble
 from rubhpc.fem.assemble import model_at
 from rubhpc.fem.linear_design import linear_design
 from rubhpc.fem.modes import modes

@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import read_rig
 
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.modes import modes, whirl_index, whirl_word
 from rubhpc.fem.rotor import assemble_rotor
 from rubhpc.rig.parts import Bearing, Damping, Disc, ShaftSection, Torsion
-from rubhpc.rig.reading import read_rig
 from rubhpc.rig.rig import Rig
 from rubhpc.rig.rotors import Rotor
 

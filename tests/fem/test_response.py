@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import read_rig
 
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
@@ -16,7 +17,6 @@ from rubhpc.fem.response import (
     step_limit,
 )
 from rubhpc.rig.parts import Bearing, Damping, Disc, ShaftSection
-from rubhpc.rig.reading import read_rig
 from rubhpc.rig.rig import Rig
 from rubhpc.rig.rotors import Rotor, Unbalance
 

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import read_rig
 
-import rubhpc
 from rubhpc.fem import statics
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.stator import assemble_stator
 
-RIG = rubhpc.read_rig("mokhtar2017")
+RIG = read_rig("mokhtar2017")
 
 
 def ring(n, **changes):

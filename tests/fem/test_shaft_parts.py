@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import read_rig, simulate
 from scipy.linalg import eigh
 
-from rubhpc import assemble, read_rig, simulate
+from rubhpc import assemble
 from rubhpc.fem.assemble import model_at
 from rubhpc.fem.beam import join, rotor_elements
 from rubhpc.fem.modes import modes

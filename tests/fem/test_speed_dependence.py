@@ -5,9 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from closed_form import Contact, run_up, simulate
 from trial_rig import trial_rig
 
-from rubhpc import InputError, assemble, run_up, simulate
+from rubhpc import InputError, assemble
 from rubhpc.fem.assemble import model_at
 from rubhpc.fem.modes import modes
 from rubhpc.fem.response import (
@@ -103,7 +104,7 @@ def sweep(speeds):
     rig = rig_on(TABLE)
     axes = [("speed", speeds), ("clearance_ratio", [0.8]), ("friction", [0.1])]
     axes = tuple(make_axis(name, values, rig) for name, values in axes)
-    return CaseGrid(Study(title="tables", rig=rig, axes=axes, output=Path("none.zarr")))
+    return CaseGrid(Study(title="tables", rig=rig, axes=axes, contact=Contact(), output=Path("none.zarr")))
 
 
 def test_a_study_takes_each_case_at_its_speed():

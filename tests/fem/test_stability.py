@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import read_rig
 
-from rubhpc import Rig, assemble, read_rig
+from rubhpc import Rig, assemble
 from rubhpc.fem.modes import modes
 from rubhpc.fem.stability import (
     instability_message,

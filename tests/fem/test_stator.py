@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import read_rig
 
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.beam import shear_coefficient_circle, shear_coefficient_rectangle
 from rubhpc.fem.stator import assemble_stator
 from rubhpc.rig.parts import Damping, Disc
-from rubhpc.rig.reading import read_rig
 from rubhpc.rig.stators import Stator
 
 STATOR = Stator(

@@ -3,13 +3,12 @@
 import math
 
 import pytest
+from closed_form import Contact, read_rig, simulate
 
-import rubhpc
 from rubhpc import InputError
 from rubhpc.integrate.modal_setup import CONTACT_STEPS, FINEST_TICK, LONGEST_TURN
 from rubhpc.integrate.setup import prepare
-from rubhpc.rig.reading import read_rig
-from rubhpc.study.study import Contact, Integrator
+from rubhpc.study.study import Integrator
 
 
 def clock(speed: float, samples: int):
@@ -46,4 +45,4 @@ def test_a_speed_at_which_ticks_cannot_be_counted_is_refused() -> None:
     with pytest.raises(
         InputError, match=r"too slow for events timed to 0\.19 ns; take 0\.0005 rad/s or more"
     ):
-        rubhpc.simulate("mokhtar2017", speed=-0.9 * slowest, clearance="80 um", friction=0.1)
+        simulate("mokhtar2017", speed=-0.9 * slowest, clearance="80 um", friction=0.1)

@@ -4,9 +4,10 @@ import math
 from dataclasses import replace
 
 import pytest
+from closed_form import read_rig, simulate
 from trial_rig import trial_rig
 
-from rubhpc import LumpedStator, read_rig, simulate
+from rubhpc import LumpedStator
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
 from rubhpc.rig.reading import with_keys
 from rubhpc.rig.rotors import Load

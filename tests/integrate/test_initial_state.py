@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import Contact, read_rig, simulate
 from record_distance import MOTIONS
 from trial_rig import trial_rig
 
-from rubhpc import LumpedStator, read_rig, simulate
+from rubhpc import LumpedStator
 from rubhpc.errors import InputError
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.record import State
@@ -18,7 +19,7 @@ from rubhpc.integrate.setup import prepare
 from rubhpc.integrate.start import _least_forces, at_rest, fit_to_gaps, gaps
 from rubhpc.kernels.mode_change import GAP_TOLERANCE
 from rubhpc.study.initial import Initial
-from rubhpc.study.study import Contact, Integrator, Recording
+from rubhpc.study.study import Integrator, Recording
 
 SPIN = 220.0  # rad/s
 SHORT = Recording(transient=0, revolutions=2, samples_per_revolution=64)

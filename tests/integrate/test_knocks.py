@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import psutil
 import pytest
+from closed_form import simulate
 from running import environment, write_knocks
 
 from postproc.figures.resilience_curve import resilience
@@ -19,7 +20,6 @@ from rubhpc.errors import InputError
 from rubhpc.knock_cases import LeastKnock, Progress, _Knocks
 from rubhpc.knock_search import Direction, find_least
 from rubhpc.knocks import least_knock
-from rubhpc.simulate import simulate
 from rubhpc.study.cases import CaseGrid
 from rubhpc.study.study import read_study
 
@@ -29,6 +29,8 @@ rig = "{rig}"
 speed_ratio = 1.22
 clearance = "300 um"
 friction = 0.0
+[contact]
+model = "mokhtar2017"
 [record]
 transient = "direct"
 revolutions = 4

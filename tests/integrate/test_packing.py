@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import read_rig
 from scipy.linalg import block_diag
 
-from rubhpc import read_rig
 from rubhpc.fem.assemble import assemble
 from rubhpc.integrate.packing import pack, pairs_of
 from rubhpc.rig.parts import Bearing

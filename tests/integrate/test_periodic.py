@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import branch, periodic, read_rig, simulate
 
-import rubhpc
-from rubhpc import LumpedStator, NoPeriodicMotion, RubError, read_rig, simulate
+from rubhpc import LumpedStator, NoPeriodicMotion, RubError
 from rubhpc.errors import InputError
 from rubhpc.schema import REGIME
 
@@ -17,7 +17,7 @@ JUMP = {"clearance": 3e-4, "friction": 0.0, "keep": ()}
 
 
 def test_solution_is_what_a_long_simulation_settles_on():
-    motion = rubhpc.periodic("mokhtar2017", **BITES, period=2)
+    motion = periodic("mokhtar2017", **BITES, period=2)
     record = simulate("mokhtar2017", **BITES, transient=200, revolutions=2)
     assert (motion.period, motion.is_stable, record.period) == (2, True, 0)
     assert motion.residual < 1e-10
@@ -32,7 +32,7 @@ def test_solution_is_what_a_long_simulation_settles_on():
 
 
 def test_shortest_period_is_found_and_records_repeat():
-    motion = rubhpc.periodic("mokhtar2017", **BITES, period=4, repeat=3)
+    motion = periodic("mokhtar2017", **BITES, period=4, repeat=3)
     assert motion.period == 2
     assert motion.record.vertical.size == 3 * 2 * 256
     assert np.array_equal(motion.record.vertical[:512], motion.record.vertical[512:1024])
@@ -42,8 +42,8 @@ def test_shortest_period_is_found_and_records_repeat():
 
 def test_two_motions_of_one_case():
     """Besides the motion that repeats itself after two revolutions there is a stable one of a single."""
-    twice = rubhpc.periodic("mokhtar2017", **BITES, period=2)
-    once = rubhpc.periodic("mokhtar2017", **BITES, period=1, initial=twice.state)
+    twice = periodic("mokhtar2017", **BITES, period=2)
+    once = periodic("mokhtar2017", **BITES, period=1, initial=twice.state)
     assert (once.period, once.is_stable) == (1, True)
     assert simulate("mokhtar2017", **BITES, initial=once.state, transient=20, revolutions=4).period == 1
 
@@ -72,7 +72,7 @@ def assert_ends_where_it_starts(state, record):
 @pytest.mark.parametrize("law", LAWS)
 def test_record_ends_where_it_starts(law):
     """Under the penalty in contact, which is closed at the angle 0."""
-    motion = rubhpc.periodic("mokhtar2017", **RUBS, clearance="100 um", **LAWS[law])
+    motion = periodic("mokhtar2017", **RUBS, clearance="100 um", **LAWS[law])
     assert_ends_where_it_starts(motion.state, motion.record)
     assert bool(motion.state.contact_force.any()) == ("penalty" in law)
     if law == "penalty":
@@ -80,7 +80,7 @@ def test_record_ends_where_it_starts(law):
 
 
 def test_records_of_a_branch_end_where_they_start():
-    (found,) = rubhpc.branch(
+    (found,) = branch(
         "mokhtar2017", **RUBS, along="clearance", start="100 um", stop="98 um", largest_step="2 um", **SOFT
     )
     for i, point in enumerate(found.points):
@@ -91,7 +91,7 @@ def test_records_of_a_branch_end_where_they_start():
 def test_motion_beside_it_draws_near_by_the_largest_multiplier():
     """From beside the solution along its first direction, over a few periods."""
     case = {"speed_ratio": 1.32, "keep": ()} | JUMP
-    rub = rubhpc.periodic(RING, **case, initial=followed(RING, 1.32).state)
+    rub = periodic(RING, **case, initial=followed(RING, 1.32).state)
     growth = rub.multipliers[0]
     assert abs(growth.imag) < 1e-12
     assert rub.is_stable
@@ -107,7 +107,7 @@ def followed(rig, last):
     """The rub followed up in speed."""
     motion = None
     for ratio in np.arange(1.17, last + 1e-9, 0.03):
-        motion = rubhpc.periodic(rig, speed_ratio=ratio, initial=motion and motion.state, **JUMP)
+        motion = periodic(rig, speed_ratio=ratio, initial=motion and motion.state, **JUMP)
     return motion
 
 
@@ -120,7 +120,7 @@ def nudged(state, share):
 
 
 def test_motion_without_contact_is_the_steady_response():
-    motion = rubhpc.periodic("mokhtar2017", speed_ratio=0.75, clearance="300 um", period=1)
+    motion = periodic("mokhtar2017", speed_ratio=0.75, clearance="300 um", period=1)
     assert motion.iterations <= 1
     assert motion.events == ()
     assert motion.record.regime == REGIME.index("no_contact")
@@ -155,7 +155,7 @@ def test_motion_without_contact_is_the_steady_response():
 )
 def test_bad_arguments_are_refused(arguments, text):
     with pytest.raises(InputError, match=text) as caught:
-        rubhpc.periodic("mokhtar2017", **BITES | arguments)
+        periodic("mokhtar2017", **BITES | arguments)
     assert "\n" not in str(caught.value)
 
 
@@ -163,7 +163,5 @@ def test_failure_says_why():
     """Near the onset of chaos at 30 GPa nothing of seven revolutions is found."""
     case = {"speed_ratio": 4.55, "clearance_ratio": 0.7, "friction": 0.3}
     with pytest.raises(NoPeriodicMotion, match="no motion of period 7 was found: ") as caught:
-        rubhpc.periodic(
-            "mokhtar2017", **case, overrides={"stator.youngs_modulus": "30 GPa"}, period=7, transient=30
-        )
+        periodic("mokhtar2017", **case, overrides={"stator.youngs_modulus": "30 GPa"}, period=7, transient=30)
     assert isinstance(caught.value, RubError)

@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 import pytest
+from closed_form import simulate
 from trial_rig import trial_rig
 
-from rubhpc import Probe, simulate
+from rubhpc import Probe
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.probes import with_probes
 from rubhpc.fem.response import steady_response

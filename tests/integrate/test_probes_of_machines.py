@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import simulate
 from overhung_pump import SEGMENT, pump
 from trial_rig import STEEL, trial_rig
 
-from rubhpc import LumpedStator, Probe, Rig, Unbalance, simulate
+from rubhpc import LumpedStator, Probe, Rig, Unbalance
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.probes import with_probes
 from rubhpc.integrate.packing import degrees_of, whole_system

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import read_rig
 
-from rubhpc import read_rig
 from rubhpc.fem.assemble import assemble
 from rubhpc.integrate.measuring.divergence import diverged_record
 from rubhpc.integrate.record import Record, RecordVariables, State

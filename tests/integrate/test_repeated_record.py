@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import read_rig, simulate
 
-from rubhpc import LumpedStator, read_rig, simulate
+from rubhpc import LumpedStator
 from rubhpc.integrate import case, marched_record
 from rubhpc.recent import forget
 from rubhpc.rig.reading import with_keys

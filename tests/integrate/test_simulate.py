@@ -6,8 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import Contact, read_rig, simulate
 
-from rubhpc import InputError, State, read_rig, simulate
+import rubhpc
+from rubhpc import InputError, State, models, recent
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency, step_limit
 from rubhpc.integrate.case import run_case
@@ -17,7 +19,7 @@ from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import PACKAGED, with_keys
 from rubhpc.schema import DIVERGED, DONE, SECTION_NAMES, SIGNAL_NAMES, VARIABLES
 from rubhpc.spectra import amplitude_spectrum
-from rubhpc.study.study import Contact, Integrator, Recording
+from rubhpc.study.study import Integrator, Recording
 
 RIG = read_rig("mokhtar2017")
 MODEL = assemble(RIG)
@@ -324,3 +326,25 @@ def test_motion_without_contact_is_reported_as_such():
 
 def test_state_at_rest_is_where_a_run_begins():
     assert same(simulate(RIG, **RUB), simulate(RIG, **RUB, initial=State.at_rest(MODEL)))
+
+
+@pytest.mark.parametrize("function", [rubhpc.simulate, rubhpc.periodic, rubhpc.branch, rubhpc.run_up])
+def test_a_model_is_an_argument(function):
+    given = {rubhpc.branch: {"along": "friction", "start": 0.1, "stop": 0.2}}
+    given = given.get(function, {}) | {"model": "mokhtar2017", "normal": "updated", "clearance": "84 um"}
+    given |= {"start": 90.0, "stop": 99.0, "time": 1.0} if function is rubhpc.run_up else {}
+    with pytest.raises(InputError, match='normal: "updated" conflicts with model = "mokhtar2017"'):
+        function("mokhtar2017", **({"speed": 90.0} if function is not rubhpc.run_up else {}), **given)
+
+
+def test_a_model_is_what_its_keys_are_and_what_the_central_difference_needs(monkeypatch):
+    named = rubhpc.simulate("mokhtar2017", **RUB, model="mokhtar2017")
+    monkeypatch.setattr(models, "NORMAL", "updated")
+    monkeypatch.setattr(models, "GEOMETRY", "second_order")
+    assert same(rubhpc.simulate("mokhtar2017", **RUB, model="mokhtar2017"), named)
+    assert same(simulate("mokhtar2017", **RUB), named)
+    recent.forget()
+    with pytest.raises(
+        InputError, match=r'method: central-difference .* add \[contact\] model = "mokhtar2017"'
+    ):
+        rubhpc.simulate("mokhtar2017", **RUB)

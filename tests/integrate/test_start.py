@@ -6,14 +6,13 @@ import math
 
 import numpy as np
 import pytest
+from closed_form import Contact, simulate
 from trial_rig import trial_rig
 
-from rubhpc import simulate
 from rubhpc.errors import InputError
 from rubhpc.fem.response import contact_free_amplitude
 from rubhpc.integrate.setup import prepare
 from rubhpc.integrate.start import gaps, start_of
-from rubhpc.study.contact_keys import Contact
 from rubhpc.study.initial import Initial
 from rubhpc.study.tables import Integrator
 

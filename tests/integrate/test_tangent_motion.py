@@ -5,9 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import Contact, read_rig, simulate
 from trial_rig import trial_rig
 
-from rubhpc import LumpedStator, simulate
+from rubhpc import LumpedStator
 from rubhpc.integrate import tangent_motion
 from rubhpc.integrate.case import march_of
 from rubhpc.integrate.marches import met_modes
@@ -22,8 +23,8 @@ from rubhpc.integrate.tangent_motion import TangentMotion, _ModesOfTrail, _motio
 from rubhpc.integrate.transient import pass_revolutions
 from rubhpc.kernels import trail
 from rubhpc.kernels.case_progress import CONTACT_UNSOLVED
-from rubhpc.rig.reading import read_rig, with_keys
-from rubhpc.study.study import Contact, Integrator, Recording
+from rubhpc.rig.reading import with_keys
+from rubhpc.study.study import Integrator, Recording
 
 SPEED, CLEARANCE, FRICTION, N_REVOLUTION = 170.0, 80e-6, 0.2, 6
 SOFT = {"law": "penalty", "stiffness": 1e6, "damping": 20.0}

@@ -1,6 +1,7 @@
 """A trail's room goes from case to case, and changes nothing of what they measure."""
 
-from rubhpc import read_rig, simulate
+from closed_form import read_rig, simulate
+
 from rubhpc.integrate import case
 from rubhpc.rig.reading import with_keys
 

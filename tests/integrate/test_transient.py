@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from closed_form import simulate
 
-from rubhpc import simulate
 from rubhpc.errors import InputError
 from rubhpc.integrate.measuring.samples import new_accumulator, no_record
 from rubhpc.integrate.periodic_motions import direct, solved_motion

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from calling import called
+from closed_form import read_rig
 from kernel_case import KernelCase
 
-from rubhpc import read_rig
 from rubhpc.kernels.accumulators import (
     DAMPING_LOSS,
     DRIVE_WORK,

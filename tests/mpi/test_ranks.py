@@ -138,7 +138,7 @@ INTERRUPTED = "def build():\n    raise KeyboardInterrupt\n"
 def test_an_interrupt_within_a_rig_ends_all_ranks(tmp_path, launcher):
     (tmp_path / "rig.py").write_text(INTERRUPTED)
     study = write_study(tmp_path)
-    study.write_text(study.read_text().replace("mokhtar2017", "rig.py:build"))
+    study.write_text(study.read_text().replace('rig = "mokhtar2017"', 'rig = "rig.py:build"'))
     done = run(study, "--trust-rig", ranks=2, launcher=launcher, timeout=60)
     assert done.returncode == 75
     assert complaint(done.stderr) == "rubhpc: interrupted; run the same command again"

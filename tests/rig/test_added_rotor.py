@@ -7,15 +7,14 @@ from typing import get_type_hints
 
 import numpy as np
 import pytest
+from closed_form import read_rig, simulate
 
-import rubhpc
 from rubhpc.errors import InputError
 from rubhpc.fem.model import Body
 from rubhpc.fem.rotor import assemble_rotor
 from rubhpc.input import reading
 from rubhpc.input.fields import FieldError, check_fields, quantity
 from rubhpc.rig import rig as rig_module
-from rubhpc.rig.reading import read_rig
 from rubhpc.rig.rig import Rig
 from rubhpc.rig.rotors import AnyRotor, RotorForces
 
@@ -110,7 +109,7 @@ def test_it_rubs_as_the_rotor_of_the_same_matrices_does(known, tmp_path):
         gravity=given.rotor.gravity,
     )
     case = {"speed_ratio": 0.9, "clearance": "250 um", "friction": 0.02, "transient": 10, "revolutions": 8}
-    new, old = rubhpc.simulate(given, **case), rubhpc.simulate(same, **case)
+    new, old = simulate(given, **case), simulate(same, **case)
     assert new.peak_contact_force.max() > 10.0
     assert np.array_equal(new.peak_contact_force, old.peak_contact_force)
     assert np.array_equal(new.vertical, old.vertical)

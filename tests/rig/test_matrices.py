@@ -7,18 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from closed_form import read_rig, simulate
 
-from rubhpc import (
-    InputError,
-    LumpedStator,
-    MatrixStator,
-    Rig,
-    Stator,
-    Unbalance,
-    assemble,
-    read_rig,
-    simulate,
-)
+from rubhpc import InputError, LumpedStator, MatrixStator, Rig, Stator, Unbalance, assemble
 from rubhpc.fem.modes import modes
 from rubhpc.fem.response import first_lateral_frequency, steady_response, step_limit
 from rubhpc.fem.statics import FLOATS, find_rigid_body_mode

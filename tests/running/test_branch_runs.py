@@ -31,6 +31,8 @@ rig = "mokhtar2017"
 clearance = { start = "112 um", stop = "124 um" }
 speed_ratio = [0.74, 0.75]
 friction = 0.3
+[contact]
+model = "mokhtar2017"
 [branch]
 along = "clearance"
 periods = [1, 2]
@@ -177,7 +179,7 @@ def test_multipliers_are_drawn(store):
         ('step = "4 um"', 'step = "4 kg"', "step: "),
         ('step = "4 um"', "step = 0", "step: 0 is out of range"),
         ("sweeps = 1", "sweep = 1", "unknown key; did you mean sweeps"),
-        ("[record]", '[contact]\nnormal = "updated"\n[record]', "branches need motion in closed form"),
+        ('model = "mokhtar2017"', 'normal = "updated"', "branches need motion in closed form"),
         (
             "[record]",
             '[override]\n"stator.geometry" = "second_order"\n[record]',

@@ -16,8 +16,9 @@ def study(tmp_path):
     path.write_text(
         'title = "ring"\nrig = "mokhtar2017"\noutput = "ring.zarr"\n'
         "[grid]\nspeed_ratio = [1.5]\nclearance_ratio = [0.8]\nfriction = [0.1]\n"
+        '[contact]\nmodel = "mokhtar2017"\n'
     )
-    read, packaged = read_study(path), read_rig("mokhtar2017")
+    read, packaged = read_study(path), read_rig("mokhtar2017").with_geometry("linear")
     return replace(read, rig=replace(packaged, stator=(replace(packaged.stator[0], count=8),)))
 
 

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 import xarray as xr
+from closed_form import simulate
 from running import array_of, stored_bytes, write_study
 
-from rubhpc import State, assemble, simulate
+from rubhpc import State, assemble
 from rubhpc.errors import InputError, StoppedEarly, StoreError
 from rubhpc.rig.reading import read_rig
 from rubhpc.running import driver, job, worker

@@ -27,6 +27,8 @@ inertia = "0.002 kg m^2"
 "drive.torque" = ["-5 N m", "1 N m"]
 clearance = ["100 um", "5 mm"]
 friction = 0.2
+[contact]
+model = "mokhtar2017"
 [record]
 samples_per_revolution = 32
 [run]

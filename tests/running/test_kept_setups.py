@@ -16,7 +16,7 @@ def study(tmp_path):
     text = (ROOT / "rubhpc" / "rigs" / "mokhtar2017.toml").read_text()
     (tmp_path / "ring.toml").write_text(text.replace("[[stator]]", "[[stator]]\ncount = 3"))
     path = write_study(tmp_path, friction=[0.1, 0.3], clearance_ratio=[0.5, 0.7], transient=6)
-    path.write_text(path.read_text().replace('"mokhtar2017"', '"ring.toml"'))
+    path.write_text(path.read_text().replace('rig = "mokhtar2017"', 'rig = "ring.toml"'))
     return read_study(path)
 
 

@@ -23,6 +23,8 @@ rig = "mokhtar2017"
 speed_ratio = [0.6, 1.7]
 clearance = "100 um"
 friction = 0.3
+[contact]
+model = "mokhtar2017"
 [record]
 transient = 4
 revolutions = 4

@@ -34,6 +34,8 @@ stop = "1500 rpm"
 "run_up.time" = ["0.3 s", "0.5 s"]
 clearance = ["100 um", "5 mm"]
 friction = 0.2
+[contact]
+model = "mokhtar2017"
 [record]
 samples_per_revolution = 32
 [[record.probe]]

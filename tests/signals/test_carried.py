@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 import synthetic_store
 import xarray as xr
+from closed_form import read_rig
 
 from postproc.figures.drawing import house_style, new_figure
 from postproc.figures.orbit import draw_orbit
 from postproc.signals.waveforms import mean_shift, orbit_data
 from postproc.store.select import select
-from rubhpc import Carrier, read_rig
+from rubhpc import Carrier
 
 ONE = {"speed_ratio": 0.75, "clearance": 84e-6, "friction": 0.3, "stator_youngs_modulus": 3e9}
 

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
+from closed_form import read_rig, simulate
 
 from postproc.signals.contacts import (
     contact_spans,
@@ -18,7 +19,6 @@ from postproc.signals.contacts import (
     touching,
 )
 from postproc.signals.decay import decaying_sine
-from rubhpc import read_rig, simulate
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.modes import modes

@@ -8,6 +8,7 @@ import pytest
 import synthetic_store
 import xarray as xr
 from click.testing import CliRunner
+from closed_form import simulate
 
 from postproc.catalogue import figures
 from postproc.figures.drawing import house_style, new_figure
@@ -22,7 +23,6 @@ from postproc.signals.hilbert_huang import (
     span_frequencies,
 )
 from postproc.store.select import select
-from rubhpc import simulate
 from rubhpc.commands.figures import figure_command
 from rubhpc.errors import InputError
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
+from closed_form import read_rig, simulate
 from scipy.stats import norm
 
 from postproc.cases.detection import TOGETHER, area_under_curve, judge
@@ -13,7 +14,6 @@ from postproc.catalogue import figures
 from postproc.figures.drawing import house_style, new_figure
 from postproc.figures.indicators import NAMES, draw_panels
 from postproc.signals.indicators import CHANNELS, INDICATORS, indicator_scores
-from rubhpc import read_rig, simulate
 from rubhpc.commands.figures import figure_command
 from rubhpc.errors import InputError
 from rubhpc.schema import DONE

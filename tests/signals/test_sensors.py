@@ -4,6 +4,7 @@ import data_logger
 import numpy as np
 import pytest
 import xarray as xr
+from closed_form import run_up, simulate
 
 import rubhpc
 from rubhpc import Sensor, sense
@@ -126,9 +127,7 @@ def test_bad_sensors_are_refused_in_one_line(sensors, keys, message):
 
 @pytest.fixture(scope="module")
 def case():
-    record = rubhpc.simulate(
-        "mokhtar2017", speed_ratio=1.5, clearance_ratio=0.7, friction=0.2, revolutions=24
-    )
+    record = simulate("mokhtar2017", speed_ratio=1.5, clearance_ratio=0.7, friction=0.2, revolutions=24)
     return record.to_dataset()
 
 
@@ -160,7 +159,7 @@ def test_order_amplitudes_and_phases_come_back_in_every_format(tmp_path, case, k
 
 
 def test_a_run_up_is_sensed_at_its_speeds(tmp_path):
-    passage = rubhpc.run_up("mokhtar2017", start="1200 rpm", stop="1800 rpm", time="1 s", clearance="5 mm")
+    passage = run_up("mokhtar2017", start="1200 rpm", stop="1800 rpm", time="1 s", clearance="5 mm")
     sensed = sense(passage, {"vertical": {"step": 1e-8}, "stator_lateral": {}}, rate=12800.0)
     sensed.to_dataframe().to_csv(tmp_path / "up.csv")
     found = rubhpc.measured(

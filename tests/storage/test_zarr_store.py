@@ -191,7 +191,10 @@ def test_lengthened_axes_keep_what_is_there(tmp_path, study, store):
         ({"transient": 5}, "record.transient was 1, is 5"),
         ({"speed_ratio": [0.9]}, "axis speed_ratio lacks 2, which is stored"),
         ({"keep": '["waveform"]'}, "record.keep"),
-        ({"run": '[contact]\nnormal = "updated"'}, 'contact.normal was "fixed", is "updated"'),
+        (
+            {"contact": 'normal = "updated"\nfriction_law = "sliding"'},
+            'contact.normal was "fixed", is "updated"',
+        ),
         ({"run": '[override]\n"stator.length" = "50 mm"'}, "rig.stator.1.length was 0.04, is 0.05"),
         ({"run": '[override]\n"rotor.damping.alpha" = 30'}, "rig.rotor.damping.alpha was 31.7, is 30"),
     ],

@@ -9,15 +9,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from closed_form import Contact, read_rig
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
-from rubhpc.rig.reading import read_rig, with_keys
+from rubhpc.rig.reading import with_keys
 from rubhpc.study.cases import CaseGrid
-from rubhpc.study.study import Contact, Integrator, Recording, Run, Study, make_axis
+from rubhpc.study.study import Integrator, Recording, Run, Study, make_axis
 
 RIG = read_rig("mokhtar2017")
 SMALL = {"speed_ratio": [0.75, 1.5], "clearance_ratio": [0.7, 0.85], "friction": [0.1, 0.3, 0.5]}
@@ -25,7 +26,8 @@ SMALL = {"speed_ratio": [0.75, 1.5], "clearance_ratio": [0.7, 0.85], "friction":
 
 def study(grid=SMALL, rig=RIG, **parts):
     axes = tuple(make_axis(name, values, rig) for name, values in grid.items())
-    return Study(title="t", rig=rig, axes=axes, **({"output": Path("t.zarr")} | parts))
+    given = {"output": Path("t.zarr"), "contact": Contact()} | parts
+    return Study(title="t", rig=rig, axes=axes, **given)
 
 
 @st.composite

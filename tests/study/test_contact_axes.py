@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 import xarray as xr
+from closed_form import LAWS, Contact
 
 from postproc.cases.maps import validity
 from postproc.store.rig_of_case import rig_of
@@ -19,7 +20,6 @@ from rubhpc.study.axes import Axis
 from rubhpc.study.axis_reading import make_axis
 from rubhpc.study.branch_keys import BranchKeys
 from rubhpc.study.cases import CaseGrid
-from rubhpc.study.contact_keys import Contact
 from rubhpc.study.study import read_study
 
 BASE = """
@@ -40,7 +40,9 @@ keep = ["section"]
 
 def study_of(tmp_path, axes="", contact="", rest=""):
     path = tmp_path / "laws.toml"
-    path.write_text(f"{BASE}{axes}\n[contact]\n{contact}\n{rest}")
+    closed = {key: word for key, word in LAWS.items() if key not in f"{axes}{contact}"}
+    laws = "\n".join([contact, *(f'{key} = "{word}"' for key, word in closed.items())])
+    path.write_text(f'{BASE}{axes}\n[override]\n"stator.geometry" = "linear"\n[contact]\n{laws}\n{rest}')
     return read_study(path, tmp_path / "laws.zarr")
 
 

@@ -165,10 +165,10 @@ def test_a_store_shows_its_sample(tmp_path):
         ('"log"', '"loog"', 'scale "loog" is unknown'),
         ("{ start = 1.2, stop = 2.4 }", "1.7", "friction is the only range; write at least two"),
         ("[sample]\nn = 8", "", "a range has either step or num; write one of them, or add [sample]"),
-        ("[integrator]", '"stator.elements" = { start = 2, stop = 6 }\n[integrator]', "none but a quantity"),
+        ("[contact]", '"stator.elements" = { start = 2, stop = 6 }\n[contact]', "none but a quantity"),
         (
-            "[integrator]",
-            '"rotor.shaft.inner_diameter" = { start = "1 mm", stop = "3 cm" }\n[integrator]',
+            "[contact]",
+            '"rotor.shaft.inner_diameter" = { start = "1 mm", stop = "3 cm" }\n[contact]',
             "rotor.shaft.inner_diameter = 0.03: invalid rig",
         ),
     ],

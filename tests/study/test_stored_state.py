@@ -5,9 +5,10 @@ import shutil
 import numpy as np
 import pytest
 import xarray as xr
+from closed_form import simulate
 from trial_rig import trial_rig
 
-from rubhpc import assemble, simulate
+from rubhpc import assemble
 from rubhpc.errors import InputError
 from rubhpc.running.driver import run
 from rubhpc.study.cases import CaseGrid
@@ -17,12 +18,13 @@ from rubhpc.study.study import read_study
 
 GRID = '[grid]\nspeed_ratio = [0.75, 0.8]\nclearance = "100 um"\nfriction = 0.3\n'
 RECORD = "[record]\ntransient = 0\nrevolutions = 2\nsamples_per_revolution = 32\n"
+LAW = '[contact]\nmodel = "mokhtar2017"\n'
 CASE = {"clearance": "100 um", "friction": 0.3, "transient": 0, "samples_per_revolution": 32}
 
 
 def study_of(folder, name, text):
     path = folder / f"{name}.toml"
-    path.write_text('rig = "mokhtar2017"\n' + text)
+    path.write_text('rig = "mokhtar2017"\n' + text + "\n" + LAW)
     return read_study(path, folder / f"{name}.zarr")
 
 

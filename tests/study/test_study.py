@@ -10,8 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from malformed import CASES, RIG, STUDY, Malformed
 
+from rubhpc import models
 from rubhpc.errors import InputError
 from rubhpc.rig.reading import PACKAGED, read_rig
+from rubhpc.study.identity import identity_parts
 from rubhpc.study.study import Contact, Integrator, Recording, Run, make_axis, read_study
 
 JOBS = Path(__file__).parents[2] / "jobs"
@@ -108,12 +110,63 @@ def test_defaults_are_the_exact_scheme_and_the_rest_of_the_paper(tmp_path):
     study = grid(tmp_path, "")
     assert study.title == "s"
     assert study.output == Path("s.zarr")
-    assert study.rig == read_rig("mokhtar2017")
-    assert study.contact == Contact(law="lagrange", friction_law="sliding", normal="fixed")
+    assert study.rig == read_rig("mokhtar2017").with_geometry(models.GEOMETRY)
+    assert study.contact == Contact(
+        law="lagrange", friction_law=models.FRICTION_LAW, normal=models.NORMAL, model=None
+    )
     assert study.integrator == Integrator(method="modal", step=None, accuracy=1e-3)
     assert study.recording == Recording(transient=120, revolutions=64, samples_per_revolution=256)
     assert study.recording.keep == ("waveform", "spectrum", "section")
     assert study.run == Run(block=None, time_limit=None, case_time_limit=None, max_failures=None)
+
+
+@pytest.fixture
+def other_defaults(monkeypatch):
+    """Defaults that are not those of the model, for whatever can be read without them."""
+    monkeypatch.setattr(models, "NORMAL", "updated")
+    monkeypatch.setattr(models, "FRICTION_LAW", "coulomb")
+    monkeypatch.setattr(models, "GEOMETRY", "second_order")
+    monkeypatch.setattr("rubhpc.study.study.check_bent", lambda contact, integrator: None)
+
+
+def test_one_place_holds_the_defaults(tmp_path, other_defaults):
+    study = grid(tmp_path, "")
+    assert (study.contact.normal, study.contact.friction_law) == ("updated", "coulomb")
+    assert study.rig.stator[0].is_bent
+    assert study.rig.as_dict()["stator"][0]["geometry"] == "second_order"
+    assert study.model == "updated normal, Coulomb friction, second-order stators"
+    fixed = grid(tmp_path, "", override='"stator.lateral" = false')
+    assert not fixed.rig.stator[0].is_bent
+    assert grid(tmp_path, '"stator.1.lateral" = [false, true]').has_bent_stator
+
+
+def test_a_model_stands_for_its_keys(tmp_path, other_defaults):
+    """Also for the identity; a stator that gives its geometry keeps it."""
+    study = grid(tmp_path, "", contact='model = "mokhtar2017"')
+    assert (study.contact.normal, study.contact.friction_law) == ("fixed", "sliding")
+    assert study.rig.stator[0].geometry == "linear"
+    assert study.model == "model mokhtar2017"
+    assert study.as_dict()["contact"]["model"] == "mokhtar2017"
+    keys = {"contact": 'normal = "fixed"\nfriction_law = "sliding"'}
+    one_by_one = grid(tmp_path, "", override='"stator.geometry" = "linear"', **keys)
+    assert identity_parts(one_by_one) == identity_parts(study)
+    override = '"stator.geometry" = "second_order"'
+    bent = grid(tmp_path, "", override=override, contact='model = "mokhtar2017"')
+    assert bent.model == "fixed normal, sliding friction, second-order stators"
+
+
+@pytest.mark.parametrize(
+    ("text", "contact", "message"),
+    [
+        ("", 'normal = "updated"', r'\[contact\] normal: "updated" conflicts with model = "mokhtar2017"'),
+        ("", 'friction_law = "coulomb"', r'\[contact\] friction_law: "coulomb" .*"sliding"; remove one'),
+        ('"contact.normal" = ["fixed", "updated"]', "", r"contact.normal = updated: .* conflicts with model"),
+        ('"contact.model" = ["mokhtar2017"]', "", "unknown axis"),
+    ],
+)
+def test_what_a_model_is_not_is_refused(tmp_path, text, contact, message):
+    with pytest.raises(InputError, match=message):
+        grid(tmp_path, text, contact=f'model = "mokhtar2017"\n{contact}')
 
 
 def test_every_table_is_read(tmp_path):

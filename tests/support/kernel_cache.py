@@ -40,7 +40,7 @@ def compile_once() -> None:
 
 def use(scheme: str) -> None:
     """Compute a short case that needs the kernels of a scheme."""
-    import rubhpc
+    from closed_form import periodic, run_up, simulate
 
     case = {"speed_ratio": 0.75, "transient": 1, "samples_per_revolution": 32}
     options = {
@@ -53,24 +53,25 @@ def use(scheme: str) -> None:
     if scheme == "neighbours":
         _use_neighbours()
     elif scheme == "run-up":
-        rubhpc.run_up("mokhtar2017", start="1500 rpm", stop="1600 rpm", time="0.1 s", clearance="0.1 mm")
+        run_up("mokhtar2017", start="1500 rpm", stop="1600 rpm", time="0.1 s", clearance="0.1 mm")
     elif scheme.startswith("periodic"):
         law = {"friction_law": "coulomb"} if scheme.endswith("slip") else {}
-        rubhpc.periodic("mokhtar2017", **case, clearance_ratio=0.9, **law)
+        periodic("mokhtar2017", **case, clearance_ratio=0.9, **law)
     else:
-        rubhpc.simulate("mokhtar2017", **case, clearance_ratio=0.7, revolutions=2, **options[scheme])
+        simulate("mokhtar2017", **case, clearance_ratio=0.7, revolutions=2, **options[scheme])
 
 
 def _use_neighbours() -> None:
-    import rubhpc
+    from closed_form import Contact, read_rig
+
     from rubhpc.integrate.marches.event_driven import EventDrivenMarch
     from rubhpc.integrate.record import State
     from rubhpc.integrate.setup import prepare
     from rubhpc.integrate.tangent_motion import TangentMotion
-    from rubhpc.study.study import Contact, Integrator, Recording
+    from rubhpc.study.study import Integrator, Recording
 
     shared = {"contact": Contact(), "integrator": Integrator(), "samples_per_revolution": 32}
-    setup = prepare(rubhpc.read_rig("mokhtar2017"), 150.0, **shared)
+    setup = prepare(read_rig("mokhtar2017"), 150.0, **shared)
     recording = Recording(samples_per_revolution=32)
 
     def start(state: State) -> EventDrivenMarch:

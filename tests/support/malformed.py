@@ -247,7 +247,7 @@ CASES = [
     _study(
         "friction at rest while sliding",
         'law = "lagrange"',
-        "static_friction_ratio = 1.2",
+        'friction_law = "sliding"\nstatic_friction_ratio = 1.2',
         "[contact] static_friction_ratio:",
         '"coulomb"',
     ),

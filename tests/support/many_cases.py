@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import zarr
+from closed_form import Contact, read_rig
 
-from rubhpc.rig.reading import read_rig
 from rubhpc.schema import DIVERGED, DONE, VARIABLES
 from rubhpc.storage.block_files import BlockFiles
 from rubhpc.storage.layout import build, encode
@@ -50,6 +50,7 @@ def case_grid_of(shape: tuple[int, int, int], revolutions: int, folder: Path) ->
         title="many",
         rig=read_rig("mokhtar2017"),
         axes=axes,
+        contact=Contact(),
         recording=recording,
         run=Run(block=16),
         output=folder,

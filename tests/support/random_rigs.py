@@ -4,8 +4,8 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from closed_form import read_rig
 
-from rubhpc import read_rig
 from rubhpc.rig.reading import with_keys
 from rubhpc.rig.rig import Rig
 from rubhpc.rig.stators import LumpedStator

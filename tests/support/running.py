@@ -35,6 +35,8 @@ output = "{output}"
 speed_ratio = {speed_ratio}
 clearance_ratio = {clearance_ratio}
 friction = {friction}
+[contact]
+{contact}
 [integrator]
 {integrator}
 [record]
@@ -60,6 +62,7 @@ def write_study(folder: Path, name: str = "tiny.toml", **changes: object) -> Pat
         "samples_per_revolution": 32,
         "keep": '["waveform", "spectrum", "section"]',
         "block": 2,
+        "contact": 'model = "mokhtar2017"',
         "integrator": 'method = "modal"',
         "run": "",
     }
@@ -99,6 +102,8 @@ speed_ratio = {speed}
 clearance = "300 um"
 friction = 0.1
 {rest}
+[contact]
+model = "mokhtar2017"
 [override]
 "stator.youngs_modulus" = "30 GPa"
 [record]

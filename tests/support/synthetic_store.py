@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import xarray as xr
+from closed_form import read_rig
 
-from rubhpc.rig.reading import read_rig
 from rubhpc.schema import DIVERGED, DONE, FAILED, VARIABLES
 
 SAMPLES, REVOLUTIONS = 32, 8

@@ -23,6 +23,7 @@ def trial_rig(n_stator=1, *, cross=0.0, **changed):
         "poissons_ratio": 0.3,
         "density": 1157.0,
         "damping": Damping(beta=2e-5),
+        "geometry": "linear",
     }
     return Rig(
         name="trial",

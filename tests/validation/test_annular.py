@@ -11,8 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import read_rig, simulate
 
-from rubhpc import InputError, LumpedStator, assemble, read_rig, simulate
+from rubhpc import InputError, LumpedStator, assemble
 from rubhpc.fem.annular import annular_rub
 from rubhpc.schema import DIVERGED, DONE
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from closed_form import simulate
 from exact_beam import Beam, Rim, exact, second_order
 from scipy.integrate import solve_bvp
 from trial_rig import trial_rig
 
-from rubhpc import simulate
 from rubhpc.fem.assemble import assemble
 
 LENGTH, WIDTH, HEIGHT, YOUNGS = 0.04, 0.005, 0.001, 3e9  # slender: shear adds 1e-3 of the deflection

@@ -5,16 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import Contact, branch, periodic, read_rig
 
-import rubhpc
-from rubhpc import LumpedStator, Rig, Unbalance, read_rig
+from rubhpc import LumpedStator, Rig, Unbalance
 from rubhpc.integrate.branches.arclength import follow
 from rubhpc.integrate.branches.branching import Branching
 from rubhpc.integrate.branches.events import Event
 from rubhpc.integrate.periodic_motions.family import Family
 from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import with_keys
-from rubhpc.study.study import Contact, Integrator
+from rubhpc.study.study import Integrator
 
 
 class CrossCoupled(Family):
@@ -59,11 +59,11 @@ def test_ring_of_springs_over_its_clearance():
     springs = LumpedStator(node=8, radius=0.06, count=8, mass=1e-3, damping=2.0, stiffness=1e5)
     ring = replace(read_rig("mokhtar2017"), stator=(springs,))
     case = {"speed_ratio": 1.25, "friction": 0.0}
-    (found,) = rubhpc.branch(
+    (found,) = branch(
         ring, along="clearance", start="240 um", stop="420 um", largest_step="40 um", transient=40, **case
     )
     kinds = [name for name, _ in found.events() if name != "grazing"]
-    free = rubhpc.periodic(ring, clearance=1e-3, keep=(), **case).record.contact_free_amplitude
+    free = periodic(ring, clearance=1e-3, keep=(), **case).record.contact_free_amplitude
     assert kinds == ["fold", "fold"]
     assert found.events()[-1][1] == pytest.approx(free, rel=3e-6)  # that of the full model
     assert [point.touches for point in (found.points[0], found.points[-1])] == [8, 0]
@@ -85,7 +85,7 @@ def overhung(rig):
 
 def test_overhung_disc_on_three_bearings_grazes_at_its_contact_free_amplitude():
     """Before, the motion with one impact a revolution doubles its period."""
-    (found,) = rubhpc.branch(
+    (found,) = branch(
         overhung(read_rig("mokhtar2017")), along="clearance_ratio", start=0.9, stop=1.05, speed_ratio=0.8,
         friction=0.2, doublings=0, keep=(),
     )  # fmt: skip
@@ -99,7 +99,7 @@ def test_contact_free_motion_turns_at_its_grazing_into_an_unstable_one_with_an_i
     """Three bearings, gravity and six heavy segments: depth and 1 over the multiplier go with one another."""
     rig = with_keys(read_rig("mokhtar2017"), {"rotor.gravity": "9.81 m/s^2"})
     ring = LumpedStator(node=15, radius=0.06, count=6, mass=0.3, damping=300.0, stiffness=2e6)
-    (found,) = rubhpc.branch(
+    (found,) = branch(
         replace(overhung(rig), stator=(ring,)), along="clearance", start="0.612 mm", stop="0.53 mm",
         speed_ratio=1.25, friction=0.1, restitution=0.3, doublings=0, keep=(),
         initial={"from": "contact_free"}, most_points=40,

@@ -2,13 +2,14 @@
 
 from dataclasses import replace
 
+import closed_form
 import numpy as np
 import pytest
+from closed_form import periodic, read_rig, simulate
 from scipy.optimize import brentq
 from trial_rig import trial_rig
 
-import rubhpc
-from rubhpc import LumpedStator, read_rig
+from rubhpc import LumpedStator
 from rubhpc.rig.reading import with_keys
 from rubhpc.schema import REGIME
 
@@ -20,14 +21,14 @@ BESIDE = 1e-5  # of the speed, on both sides of an event
 
 
 def followed(rig, start, stop, **case):
-    return rubhpc.branch(
+    return closed_form.branch(
         rig, along="speed_ratio", start=start, stop=stop, transient=200, doublings=0, keep="section", **case
     )[0]
 
 
 def settled(rig, value, state, n_revolution, n_seen=8, **case):
     """What a simulation comes to from a state, at another speed."""
-    return rubhpc.simulate(
+    return simulate(
         rig, speed_ratio=value, initial=state, transient=n_revolution, revolutions=n_seen,
         samples_per_revolution=64, keep="section", **case,
     )  # fmt: skip
@@ -82,7 +83,7 @@ def test_isolated_motion_of_period_three_ends_at_two_folds():
     Between lies a fold 4e-7 beside a grazing, at which a step across both ended 4e-6 too early.
     """
     case = {"clearance_ratio": 0.7, "friction": 0.3}
-    found = rubhpc.branch(
+    found = closed_form.branch(
         PAPER, along="speed_ratio", start=2.2, stop=1.8, sweeps=3, transient=200, doublings=0, most_points=80,
         keep="section", **case,
     )  # fmt: skip
@@ -108,7 +109,7 @@ def test_second_frequency_appears_where_an_overhung_disc_has_it():
     state = branch.points[branch.values.tolist().index(value)].state
 
     def solved(ratio):
-        return rubhpc.periodic(HANGING, speed_ratio=ratio, initial=state, keep="section", **case)
+        return periodic(HANGING, speed_ratio=ratio, initial=state, keep="section", **case)
 
     def excess(ratio):
         return float(abs(solved(ratio).multipliers[0]) - 1.0)
@@ -127,10 +128,10 @@ def test_second_frequency_appears_where_an_overhung_disc_has_it():
 def test_unstable_motion_is_left_at_the_rate_of_its_largest_multiplier():
     """From its own state, solved to 1e-10: a simulation spirals out by what the multipliers say."""
     case = {"clearance_ratio": 0.5, "friction": 0.2}
-    stable = rubhpc.periodic(HANGING, speed_ratio=1.24, transient=300, keep=(), **case)
+    stable = periodic(HANGING, speed_ratio=1.24, transient=300, keep=(), **case)
     state = stable.state
     for ratio in (1.235, 1.23, 1.225, 1.22):
-        motion = rubhpc.periodic(HANGING, speed_ratio=ratio, initial=state, keep=(), **case)
+        motion = periodic(HANGING, speed_ratio=ratio, initial=state, keep=(), **case)
         state = motion.state
     assert not motion.is_stable
     record = settled(HANGING, 1.22, state, 0, 220, **case)

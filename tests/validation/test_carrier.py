@@ -7,19 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import read_rig, simulate
 from scipy.integrate import solve_ivp
 
-from rubhpc import (
-    Carrier,
-    LumpedStator,
-    MatrixCarrier,
-    MatrixStator,
-    Rig,
-    Unbalance,
-    assemble,
-    read_rig,
-    simulate,
-)
+from rubhpc import Carrier, LumpedStator, MatrixCarrier, MatrixStator, Rig, Unbalance, assemble
 from rubhpc.errors import InputError
 from rubhpc.fem.annular import annular_rub
 from rubhpc.fem.modes import modes

@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import read_rig, run_up, simulate
 
-from rubhpc import InputError, LumpedStator, Rig, assemble, read_rig, run_up, simulate
+from rubhpc import InputError, LumpedStator, Rig, assemble
 from rubhpc.fem.assemble import model_at
 from rubhpc.fem.statics import sag_at
 from rubhpc.rig.bearing_table import BearingTable

@@ -5,19 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import Contact, read_rig, simulate
 from lone_bodies import body, set_up, set_up_modal, tip
 
-from rubhpc import (
-    Carrier,
-    InputError,
-    Load,
-    LumpedStator,
-    MatrixStator,
-    Rig,
-    assemble,
-    read_rig,
-    simulate,
-)
+from rubhpc import Carrier, InputError, Load, LumpedStator, MatrixStator, Rig, assemble
 from rubhpc.fem.assemble import model_at
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.record import State
@@ -27,7 +18,7 @@ from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.rig.parts import Bearing, ShaftSection
 from rubhpc.rig.reading import with_keys
 from rubhpc.rig.rotors import Rotor
-from rubhpc.study.study import Contact, Integrator, Recording
+from rubhpc.study.study import Integrator, Recording
 
 G = 9.81  # m/s2
 FAST = 50 * math.pi  # rad/s, 1500 rpm

@@ -7,8 +7,7 @@ between; and what goes in comes out.
 import math
 
 import pytest
-
-from rubhpc import simulate
+from closed_form import simulate
 
 STIFFNESS, TWIST_STIFFNESS, RADIUS = 143343.35, 3125.88, 0.06  # N/m, N m/rad at the disc (L6); m
 FRICTION = 0.3

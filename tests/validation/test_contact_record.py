@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import simulate
 from trial_rig import trial_rig
 
-from rubhpc import LumpedStator, Rig, State, assemble, simulate
+from rubhpc import LumpedStator, Rig, State, assemble
 from rubhpc.integrate.marches.march import NO_FORCES
 
 LAWS = [

@@ -6,9 +6,10 @@ from functools import partial
 
 import numpy as np
 import pytest
+from closed_form import Contact, read_rig, simulate
 from lone_bodies import body, set_up, set_up_modal, tip
 
-from rubhpc import State, read_rig, simulate
+from rubhpc import State
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import first_lateral_frequency
 from rubhpc.integrate.case import run_case
@@ -17,7 +18,7 @@ from rubhpc.integrate.scheme import Scheme
 from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import with_keys
 from rubhpc.schema import DIVERGED, DONE
-from rubhpc.study.study import Contact, Integrator, Recording
+from rubhpc.study.study import Integrator, Recording
 
 COULOMB = Contact(friction_law="coulomb")
 PRESSED = 10.0  # N, by which the rotor's vertical spring presses it onto a stator that is held

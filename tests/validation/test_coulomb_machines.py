@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from closed_form import simulate
 from time_stepping import solve
 from trial_rig import STEEL
 
-from rubhpc import Rig, simulate
+from rubhpc import Rig
 from rubhpc.rig.parts import Bearing, Damping, Disc, ShaftSection, Torsion
 from rubhpc.rig.rotors import Rotor, Unbalance
 from rubhpc.rig.stators import Stator

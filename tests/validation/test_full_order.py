@@ -11,9 +11,9 @@ from functools import lru_cache
 import numpy as np
 import pytest
 import time_stepping
+from closed_form import simulate
 from record_distance import MOTIONS
 
-from rubhpc import simulate
 from rubhpc.rig.parts import Bearing, Damping, Disc, ShaftSection, Torsion
 from rubhpc.rig.rig import Rig
 from rubhpc.rig.rotors import Rotor, Unbalance

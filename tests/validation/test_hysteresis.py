@@ -14,9 +14,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from closed_form import Contact, periodic, read_rig
 from scipy.optimize import brentq
 
-from rubhpc import LumpedStator, State, assemble, periodic, read_rig, run
+from rubhpc import LumpedStator, State, assemble, run
 from rubhpc.fem.response import first_lateral_frequency, steady_response
 from rubhpc.study.axis_reading import make_axis
 from rubhpc.study.study import Study
@@ -75,7 +76,14 @@ def test_jumps_up_and_down_are_where_the_closed_form_has_them(tmp_path):
     )
     recording = Recording(transient=30, revolutions=2, samples_per_revolution=32, keep=())
     run(
-        Study(title="ring", rig=RIG, axes=axes, recording=recording, output=tmp_path / "ring.zarr"),
+        Study(
+            title="ring",
+            rig=RIG,
+            axes=axes,
+            contact=Contact(),
+            recording=recording,
+            output=tmp_path / "ring.zarr",
+        ),
         quiet=True,
     )
     store = xr.open_zarr(tmp_path / "ring.zarr").load().squeeze()

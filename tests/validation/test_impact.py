@@ -5,16 +5,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import Contact, read_rig
 from scipy.linalg import eigh
 
-from rubhpc import State, read_rig
+from rubhpc import State
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.packing import pack
 from rubhpc.integrate.reduced_model.reduction import reduce_model
 from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.force_average import AVERAGING_TIME
 from rubhpc.rig.reading import with_keys
-from rubhpc.study.study import Contact, Integrator, Recording
+from rubhpc.study.study import Integrator, Recording
 
 STILL = {
     "rotor.damping.alpha": 0.0,

@@ -9,13 +9,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import read_rig
 
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.modes import modes, undamped_modes
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
 from rubhpc.fem.rotor import assemble_rotor
 from rubhpc.rig.parts import Bearing, Damping, ShaftSection, Torsion
-from rubhpc.rig.reading import read_rig
 from rubhpc.rig.rotors import Rotor
 
 RIG = read_rig("mokhtar2017")

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import periodic, read_rig, simulate
 
-import rubhpc
-from rubhpc import LumpedStator, MatrixStator, Rig, State, Unbalance, assemble, read_rig, simulate
+from rubhpc import LumpedStator, MatrixStator, Rig, State, Unbalance, assemble
 from rubhpc.fem.modes import modes
 from rubhpc.rig.reading import with_keys
 from rubhpc.rig.rotors import MatrixRotor
@@ -241,7 +241,7 @@ def test_rotor_of_one_degree_rests_on_a_wall_in_each_cycle(frequency, restitutio
     rotor = MatrixRotor(mass=[[1.0]], stiffness=[[1.0]], degrees=((1, "v"),), unbalance=(force,))
     rig = Rig(name="oscillator", rotor=rotor, stator=(LumpedStator(node=1, radius=1.0, rigid=True),))
     case = {"speed": frequency, "clearance": 0.1 * SMALL, "friction": 0.0, "restitution": restitution}
-    motion = rubhpc.periodic(rig, **case)
+    motion = periodic(rig, **case)
     assert motion.multipliers == pytest.approx([0.0, 0.0])  # what rests has no past
     assert motion.record.contact_impulse == pytest.approx([impulse], abs=1e-6)
     for transient in (20, "direct"):

@@ -7,11 +7,11 @@ enough to leave it if it were not its own orbit.
 
 import numpy as np
 import pytest
+from closed_form import read_rig, simulate
 from random_machines import random_machine
 from random_rigs import found_error, random_rig
 from record_distance import MOTIONS
 
-from rubhpc import read_rig, simulate
 from rubhpc.rig.reading import with_keys
 
 STIFF = {"stator.youngs_modulus": "30 GPa"}

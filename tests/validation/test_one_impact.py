@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from closed_form import Contact
 from impact_orbit import amplitude, motions, quadratic
 from lone_bodies import body, set_up_modal, tip
 from scipy.optimize import brentq
@@ -20,7 +21,7 @@ from rubhpc.integrate.case import run_case
 from rubhpc.integrate.periodic_motion import find_periodic_motion
 from rubhpc.integrate.periodic_motions.family import Family
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
-from rubhpc.study.study import Contact, Recording
+from rubhpc.study.study import Recording
 
 WALL_BODY = tip(body(1.0, 1.0, ((1, "axial"),)), 0.0, axial=-1)  # it is held
 RECORDING = Recording(transient=0, samples_per_revolution=64, keep=())

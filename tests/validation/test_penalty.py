@@ -5,11 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import Contact, simulate
 from lone_bodies import body, set_up, set_up_modal, tip
 
-from rubhpc import State, simulate
+from rubhpc import State
 from rubhpc.integrate.case import run_case
-from rubhpc.study.study import Contact, Recording
+from rubhpc.study.study import Recording
 
 MASS, STIFFNESS, SPEED = 2.0, 1e6, 1.5  # kg, N/m, m/s
 

@@ -3,8 +3,8 @@
 import math
 
 import pytest
+from closed_form import periodic, read_rig, simulate
 
-from rubhpc import periodic, read_rig, simulate
 from rubhpc.rig.reading import with_keys
 from rubhpc.schema import DONE, REGIME
 

@@ -5,17 +5,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import Contact, simulate
 from kernel_case import KernelCase
 from lone_bodies import body, set_up, tip
 from trial_rig import trial_rig
 
-from rubhpc import Load, LumpedStator, Rig, State, simulate
+from rubhpc import Load, LumpedStator, Rig, State
 from rubhpc.integrate.case import run_case
 from rubhpc.kernels.central_difference import FINISHED
 from rubhpc.kernels.laws import MULTIPLIER
 from rubhpc.rig.reading import with_keys
 from rubhpc.rig.rotors import MatrixRotor
-from rubhpc.study.study import Contact, Recording
+from rubhpc.study.study import Recording
 
 WALL = tip(body(1.0, 1.0, ((1, "axial"),)), 0.0, axial=-1)  # it is held
 

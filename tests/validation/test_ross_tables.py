@@ -9,9 +9,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from closed_form import run_up
 from scipy.interpolate import CubicSpline
 
-from rubhpc import LumpedStator, Rig, Unbalance, assemble, run_up
+from rubhpc import LumpedStator, Rig, Unbalance, assemble
 from rubhpc.fem.modes import modes
 from rubhpc.fem.response import steady_response
 from rubhpc.rig.bearing_table import BearingTable

@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import read_rig, simulate
 
-from rubhpc import State, read_rig, simulate
+from rubhpc import State
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, steady_response
 from rubhpc.rig.parts import Damping

@@ -5,12 +5,13 @@ from functools import partial
 
 import numpy as np
 import pytest
+from closed_form import Contact
 from lone_bodies import body, set_up, set_up_modal, tip
 from siconos_reference import CASES, CLEARANCE, DISC, N_SAMPLE, RADIUS, STORED, spin_of, stator
 
 from rubhpc import State
 from rubhpc.integrate.case import run_case
-from rubhpc.study.study import Contact, Recording
+from rubhpc.study.study import Recording
 
 DEGREES = ((1, "v"), (1, "w"), (1, "thx"))
 SCHEMES = {  # in steps of 0.5 us

@@ -4,14 +4,14 @@ import math
 
 import numpy as np
 import pytest
+from closed_form import Contact, simulate
 from scipy.integrate import solve_ivp
 from test_coulomb import PRESSED, pressed_onto_a_rim
 
-from rubhpc import Rig, simulate
+from rubhpc import Rig
 from rubhpc.errors import InputError
 from rubhpc.rig.rotors import Load
 from rubhpc.rig.stators import LumpedStator
-from rubhpc.study.contact_keys import Contact
 
 RIM, FRICTION, DURATION = 0.5, 0.2, 1.2  # m/s, 1, s
 STRIBECK = Contact(friction_law="stribeck", static_friction_ratio=2.0, stribeck_speed=0.2)

@@ -2,8 +2,10 @@
 
 from dataclasses import replace
 
+import closed_form
 import numpy as np
 import pytest
+from closed_form import Contact, periodic, read_rig
 
 import rubhpc
 from rubhpc import LumpedStator
@@ -15,7 +17,6 @@ from rubhpc.integrate.periodic_motions.family import MOST_KEPT, Family, Operatio
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.reduced_model.truncation import SMOOTH
 from rubhpc.integrate.start import fit_to_gaps
-from rubhpc.study.contact_keys import Contact
 from rubhpc.study.tables import Integrator
 
 CASE = {"speed_ratio": 0.75, "friction": 0.3}
@@ -24,7 +25,7 @@ ALONG = {"along": "clearance", "start": "100 um", "stop": "124 um", "largest_ste
 
 @pytest.fixture(scope="module")
 def found():
-    return rubhpc.branch("mokhtar2017", period=2, **ALONG, **CASE)
+    return closed_form.branch("mokhtar2017", period=2, **ALONG, **CASE)
 
 
 def contact_free_amplitude():
@@ -39,7 +40,7 @@ def contact_free_amplitude():
 def family_of(along, ends, contact=None):
     return Family(
         Operation(
-            rig=rubhpc.read_rig("mokhtar2017"), friction=0.3, speed_ratio=0.75, clearance=1e-4,
+            rig=read_rig("mokhtar2017"), friction=0.3, speed_ratio=0.75, clearance=1e-4,
             contact=contact or Contact(), integrator=Integrator(), samples_per_revolution=256,
         ),
         along, ends,
@@ -63,7 +64,7 @@ def test_points_are_periodic_motions(found):
         # at an event a multiplier is on the unit circle
         points = [point for point in branch.points if point.event == "none"]
         for point in points[:: len(points) // 3]:
-            motion = rubhpc.periodic(
+            motion = periodic(
                 "mokhtar2017",
                 clearance=point.value,
                 period=branch.period,
@@ -79,7 +80,7 @@ def test_points_let_go_of_the_tables_of_their_cases(monkeypatch):
     """Without room some cases are kept, whatever the length of a branch; others are set up again, alike."""
     monkeypatch.setattr(family_module, "ROOM", 0)
     family = family_of("clearance", (1.05e-4, 1.2e-4))
-    motion = rubhpc.periodic("mokhtar2017", clearance=1.06e-4, period=2, keep=(), **CASE)
+    motion = periodic("mokhtar2017", clearance=1.06e-4, period=2, keep=(), **CASE)
     setup, clearance, friction = family.settings(1.06e-4)
     case = PiecewiseMotion(setup, clearance, friction, fit_to_gaps(motion.state, setup, clearance))
     first = Branching(family, 3e-7).begin(1.06e-4, case.start, case.states, 2)
@@ -102,7 +103,7 @@ def test_stability_changes_at_events_alone(found):
 @pytest.mark.long
 def test_a_branch_between_two_doublings_is_followed_once():
     """P2 begins at a doubling right behind a grazing, has a fold and meets P1 at another doubling."""
-    once, twice = rubhpc.branch(
+    once, twice = closed_form.branch(
         "mokhtar2017", along="speed_ratio", start=0.713, stop=0.752, clearance="100 um", friction=0.3,
         largest_step=0.008, keep=(),
     )  # fmt: skip
@@ -127,7 +128,7 @@ def test_dataset_has_a_value_a_point(found):
 @pytest.mark.parametrize("along", ["clearance", "clearance_ratio"])
 def test_derivative_by_the_clearance_is_that_of_two_flows(along):
     family = family_of(along, (0.0, 0.1 if along == "clearance_ratio" else 1e-5))
-    motion = rubhpc.periodic("mokhtar2017", clearance="100 um", period=2, keep=(), **CASE)
+    motion = periodic("mokhtar2017", clearance="100 um", period=2, keep=(), **CASE)
     unit = motion.record.contact_free_amplitude if along == "clearance_ratio" else 1.0
     value = 1e-4 / unit
     setup, clearance, friction = family.settings(value)
@@ -163,9 +164,9 @@ def test_several_pairs_that_slide_under_coulombs_law_branch_as_pairs_that_slide(
     # In the same modes: Coulomb's law keeps more, for the sake of friction that sticks.
     monkeypatch.setattr("rubhpc.integrate.setup.touch_of", lambda *_, **__: SMOOTH)
     springs = rubhpc.LumpedStator(node=8, radius=0.06, count=3, mass=1e-3, damping=2.0, stiffness=1e5)
-    ring = replace(rubhpc.read_rig("mokhtar2017"), stator=(springs,))
+    ring = replace(read_rig("mokhtar2017"), stator=(springs,))
     (sliding,), (coulomb,) = (
-        rubhpc.branch(
+        closed_form.branch(
             ring, along="clearance_ratio", start=1.01, stop=0.998, speed_ratio=0.8, friction=0.1, doublings=0,
             keep=(), friction_law=law,
         )
@@ -201,13 +202,13 @@ def test_several_pairs_that_slide_under_coulombs_law_branch_as_pairs_that_slide(
 )
 def test_bad_arguments_are_refused(arguments, text):
     with pytest.raises(InputError, match=text) as caught:
-        rubhpc.branch("mokhtar2017", **CASE | ALONG | arguments)
+        closed_form.branch("mokhtar2017", **CASE | ALONG | arguments)
     assert "\n" not in str(caught.value)
 
 
 def test_a_range_of_negative_friction_is_refused():
     with pytest.raises(InputError, match=r"stop: -0\.2 is out of range; friction must be at least 0"):
-        rubhpc.branch(
+        closed_form.branch(
             "mokhtar2017", along="friction", start=0.3, stop=-0.2, speed_ratio=0.75, clearance="84 um"
         )
 
@@ -218,8 +219,8 @@ def test_a_stiffness_may_ask_for_other_modes_at_either_end(monkeypatch, keeps_th
     if not keeps_those_of_both_ends:
         monkeypatch.setattr(Family, "_reduced", lambda *_: None)
     spring = LumpedStator(node=8, radius=0.06, mass=1e-3, damping=2.0, stiffness=1e5)
-    (found,) = rubhpc.branch(
-        replace(rubhpc.read_rig("mokhtar2017"), stator=(spring,)), along="stator.stiffness", start="20 kN/m",
+    (found,) = closed_form.branch(
+        replace(read_rig("mokhtar2017"), stator=(spring,)), along="stator.stiffness", start="20 kN/m",
         stop="2 MN/m", speed_ratio=1.42, clearance="150 um", friction=0.05, transient=60,
         samples_per_revolution=64, keep=(),
     )  # fmt: skip
@@ -231,7 +232,7 @@ def test_a_stiffness_may_ask_for_other_modes_at_either_end(monkeypatch, keeps_th
 @pytest.mark.parametrize("step", [0.01, 0.001])
 def test_stretch_far_narrower_than_a_step_is_not_lost(step):
     """Stable for 7.6e-5: two multipliers come in as a pair, meet on the real axis, and one leaves by -1."""
-    (found,) = rubhpc.branch(
+    (found,) = closed_form.branch(
         "mokhtar2017", along="clearance_ratio", start=0.93, stop=0.95, largest_step=step, period=1,
         speed_ratio=2.1, friction=0.3, overrides={"stator.youngs_modulus": "30 GPa"}, doublings=0, keep=(),
     )  # fmt: skip

@@ -4,13 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import Contact, periodic, read_rig
 
-import rubhpc
 from rubhpc.integrate.branches.branching import Branching
 from rubhpc.integrate.branches.weak_impact import least_gap
 from rubhpc.integrate.periodic_motions.family import Family, Operation
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
-from rubhpc.study.contact_keys import Contact
 from rubhpc.study.tables import Integrator
 
 CASE = {"speed_ratio": 0.75, "friction": 0.3}
@@ -20,9 +19,9 @@ CASE = {"speed_ratio": 0.75, "friction": 0.3}
 def point():
     """A motion of two revolutions, of which one touches, little above the clearance at which both do."""
     clearance = 105.5e-6
-    motion = rubhpc.periodic("mokhtar2017", clearance=clearance, period=2, keep=(), **CASE)
+    motion = periodic("mokhtar2017", clearance=clearance, period=2, keep=(), **CASE)
     operation = Operation(
-        rig=rubhpc.read_rig("mokhtar2017"), clearance=clearance, contact=Contact(), integrator=Integrator(),
+        rig=read_rig("mokhtar2017"), clearance=clearance, contact=Contact(), integrator=Integrator(),
         samples_per_revolution=256, **CASE,
     )  # fmt: skip
     family = Family(operation, "clearance", (clearance, 1.2 * clearance))

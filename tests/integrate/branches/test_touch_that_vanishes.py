@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
+from closed_form import Contact, read_rig
 
-import rubhpc
 from rubhpc.integrate import modal_setup
 from rubhpc.integrate.branches.branching import Branching
 from rubhpc.integrate.branches.grazing import grazing_between, touches
 from rubhpc.integrate.branches.search import shot, simulated
 from rubhpc.integrate.periodic_motions.family import Family, Operation
-from rubhpc.study.contact_keys import Contact
 from rubhpc.study.initial import Initial
 from rubhpc.study.tables import Integrator, Recording
 
@@ -64,7 +63,7 @@ def branching(tmp_path_factory):
     path = tmp_path_factory.mktemp("rig") / "rig.toml"
     path.write_text(RIG)
     operation = Operation(
-        rig=rubhpc.read_rig(path), clearance=150e-6, friction=0.1, contact=Contact(), integrator=Integrator(),
+        rig=read_rig(path), clearance=150e-6, friction=0.1, contact=Contact(), integrator=Integrator(),
         samples_per_revolution=256,
     )  # fmt: skip
     ends = (450.0, 600.0)

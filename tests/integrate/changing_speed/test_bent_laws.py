@@ -6,9 +6,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from closed_form import run_up, simulate
 from scipy.integrate import solve_ivp
 
-from rubhpc import LumpedStator, Probe, Rig, Unbalance, run_up, simulate
+from rubhpc import LumpedStator, Probe, Rig, Unbalance
 from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.study.speed_law import LAG, SpeedLaw, cut
 

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from closed_form import run_up
 
-from rubhpc import LumpedStator, Rig, Unbalance, run_up
+from rubhpc import LumpedStator, Rig, Unbalance
 from rubhpc.rig.parts import Bearing, Damping, Disc, ShaftSection, Torsion
 from rubhpc.rig.rotors import Rotor
 

@@ -4,9 +4,9 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from closed_form import run_up
 from trial_rig import trial_rig
 
-from rubhpc import run_up
 from rubhpc.integrate.changing_speed import speed_ranges
 from rubhpc.integrate.changing_speed.passing import Passing
 

@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import run_up
 from full_order_machine import Machine, driven_machine
 from scipy.linalg import expm
 
-from rubhpc import LumpedStator, Rig, Unbalance, run_up
+from rubhpc import LumpedStator, Rig, Unbalance
 from rubhpc.errors import InputError
 from rubhpc.integrate.record import State
 from rubhpc.study.drive_law import DriveLaw

@@ -5,9 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import run_up
 from full_order_machine import Machine, driven_machine
 
-from rubhpc import Carrier, LumpedStator, Rig, Unbalance, run_up
+from rubhpc import Carrier, LumpedStator, Rig, Unbalance
 from rubhpc.integrate.changing_speed.passing import Passing
 from rubhpc.integrate.changing_speed.speed_ranges import SpeedRanges
 from rubhpc.rig.bearing_table import BearingTable

@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 import pytest
+from closed_form import read_rig, run_up
 from scipy.optimize import brentq
 
-from rubhpc import assemble, read_rig, run_up
+from rubhpc import assemble
 from rubhpc.fem.free_spin import unit_rotation
 
 INERTIA, FIRST, HELD = 1e-3, 1450.0 * math.pi / 30.0, 1500.0 * math.pi / 30.0  # kg m^2, rad/s

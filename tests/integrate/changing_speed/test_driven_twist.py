@@ -5,9 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import run_up
 from overhung_pump import SEGMENT, pump
 
-from rubhpc import LumpedStator, Probe, Rig, Unbalance, run_up
+from rubhpc import LumpedStator, Probe, Rig, Unbalance
 from rubhpc.integrate.changing_speed.free_piece import Spin
 from rubhpc.integrate.changing_speed.passing import Passing
 

@@ -31,7 +31,7 @@ fill_level = called(fill_level)
 
 
 def setup(q):
-    case = {"speed": 200.0, "clearance": "100 um", "friction": 0.2}
+    case = {"speed": 200.0, "clearance": "100 um", "friction": 0.2, "model": "mokhtar2017"}
     probe = {"name": "a", "node": 1, "angle": 0.3, "quantity": "acceleration"}
     probes = read_probes("test", [probe])
     return case_of(

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from closed_form import Contact, run_up
 from test_steep_run_ups import machine
 
-from rubhpc import Probe, run_up
+from rubhpc import Probe
 from rubhpc.integrate import case
 from rubhpc.integrate.changing_speed.case import record_run_up
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
@@ -12,7 +13,7 @@ from rubhpc.integrate.scheme import Scheme
 from rubhpc.integrate.setup import prepare
 from rubhpc.study.initial import CONTACT_FREE, Initial
 from rubhpc.study.speed_law import SpeedLaw
-from rubhpc.study.study import Contact, Integrator, Recording
+from rubhpc.study.study import Integrator, Recording
 
 PROBES = [Probe(name=f"at_{node}", node=node, quantity="bearing_force") for node in (1, 7)]
 LAW = {"start": 240.0, "stop": 300.0, "time": 0.4, "samples_per_revolution": 128}  # rad/s, s

@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import run_up
 from overhung_pump import pump
 from test_run_up_machines import TIPS
 
-from rubhpc import recent, run_up
+from rubhpc import recent
 from rubhpc.integrate.changing_speed import pieces, speed_ranges
 
 DRIVE = {"torque": "60 N m", "start": "300 rad/s", "revolutions": 5, "inertia": "0.02 kg m^2"}

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from closed_form import Contact, read_rig, run_up
 
-from rubhpc import LumpedStator, Rig, Unbalance, read_rig, run_up
+from rubhpc import LumpedStator, Rig, Unbalance
 from rubhpc.integrate.changing_speed import passing
 from rubhpc.integrate.marches import friction as friction_march
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
@@ -11,7 +12,7 @@ from rubhpc.integrate.record import State
 from rubhpc.integrate.setup import prepare
 from rubhpc.rig.parts import Bearing, Damping, Disc, ShaftSection, Torsion
 from rubhpc.rig.rotors import Rotor
-from rubhpc.study.study import Contact, Integrator
+from rubhpc.study.study import Integrator
 
 
 @pytest.mark.parametrize("overlap", [-1e-6, 1e-6])

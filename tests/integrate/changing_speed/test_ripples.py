@@ -5,16 +5,16 @@ import re
 
 import numpy as np
 import pytest
+from closed_form import Contact, run_up
 from test_steep_run_ups import PROBES, machine
 
-from rubhpc import run_up
 from rubhpc.integrate.changing_speed import ripples
 from rubhpc.integrate.changing_speed.case import record_run_up
 from rubhpc.integrate.changing_speed.ripples import Linear, Ripples
 from rubhpc.integrate.setup import prepare
 from rubhpc.study.initial import CONTACT_FREE, Initial
 from rubhpc.study.speed_law import LAG, SpeedLaw, cut
-from rubhpc.study.study import Contact, Integrator, Recording
+from rubhpc.study.study import Integrator, Recording
 
 NATURAL, DAMPING = 200.0, 0.02  # rad/s, of critical
 

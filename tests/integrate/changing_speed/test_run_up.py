@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from closed_form import Contact, run_up, simulate
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from trial_rig import trial_rig
 
-from rubhpc import LumpedStator, Rig, Unbalance, run_up, simulate
+from rubhpc import LumpedStator, Rig, Unbalance
 from rubhpc.errors import InputError
 from rubhpc.integrate.changing_speed import passing
 from rubhpc.integrate.changing_speed.run_up import integrate_run_up
@@ -20,7 +21,7 @@ from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.spectra import track_orders
 from rubhpc.study.initial import Initial
 from rubhpc.study.speed_law import LAG, SpeedLaw, cut
-from rubhpc.study.study import Contact, Integrator
+from rubhpc.study.study import Integrator
 
 M = np.diag([5.0, 5.0, 1e-2, 1e-2, 8e-3])
 C = np.diag([30.0, 30.0, 1e-3, 1e-3, 1e-2])

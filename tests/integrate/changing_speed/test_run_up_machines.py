@@ -5,9 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import run_up
 from overhung_pump import SEGMENT, pump
 
-from rubhpc import LumpedStator, Probe, run_up
+from rubhpc import LumpedStator, Probe
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.probes import with_probes
 from rubhpc.integrate.packing import whole_system

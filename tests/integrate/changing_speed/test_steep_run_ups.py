@@ -9,8 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import Contact, run_up
 
-from rubhpc import LumpedStator, Probe, Rig, Unbalance, run_up
+from rubhpc import LumpedStator, Probe, Rig, Unbalance
 from rubhpc.fem.assemble import assemble, model_at
 from rubhpc.fem.probes import with_probes
 from rubhpc.integrate.case import run_case
@@ -22,7 +23,7 @@ from rubhpc.rig.parts import Damping, Disc, ShaftSection, Torsion
 from rubhpc.rig.rotors import Rotor
 from rubhpc.study.initial import CONTACT_FREE, Initial
 from rubhpc.study.speed_law import SpeedLaw
-from rubhpc.study.study import Contact, Integrator, Recording
+from rubhpc.study.study import Integrator, Recording
 
 STEEL = {"youngs_modulus": 2.1e11, "shear_modulus": 8e10, "density": 7800.0}
 SPEEDS = (150.0, 260.0, 380.0, 520.0)  # rad/s

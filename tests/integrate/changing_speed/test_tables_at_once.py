@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import run_up
 from overhung_pump import pump
 from test_run_up_machines import PROBES, TIPS
 
-from rubhpc import run_up
 from rubhpc.integrate.changing_speed import pieces, range_library, speed_ranges
 
 CASE = {"start": 320.0, "stop": 332.0, "time": 0.18, "clearance": 1.2e-4, "friction": 0.1}

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import Contact
 from overhung_pump import SEGMENT, pump
 from test_steep_run_ups import machine
 
@@ -14,7 +15,7 @@ from rubhpc.integrate.changing_speed.case import record_run_up
 from rubhpc.integrate.setup import prepare
 from rubhpc.study.initial import CONTACT_FREE, Initial
 from rubhpc.study.speed_law import SpeedLaw
-from rubhpc.study.study import Contact, Integrator, Recording
+from rubhpc.study.study import Integrator, Recording
 
 SAMPLES, Q = 64, 6
 LAW = SpeedLaw(time=(0.0, 0.15), speed=(300.0, 360.0))

@@ -5,11 +5,9 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from closed_form import read_rig, run_up, simulate
 
-from rubhpc import simulate
 from rubhpc.integrate.marches import event_driven
-from rubhpc.rig.reading import read_rig
-from rubhpc.run_up import run_up
 
 
 def arrays_of(value, name):

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import read_rig
 from kernel_case import KernelCase
 from scipy.linalg import block_diag
 
-from rubhpc import read_rig
 from rubhpc.kernels.central_difference import CONTACT_UNSOLVED, DIVERGED, FINISHED
 from rubhpc.kernels.contact_pairs import V
 from rubhpc.rig.parts import Bearing

@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import simulate
 from record_distance import MOTIONS
 from trial_rig import trial_rig
 
-from rubhpc import LumpedStator, simulate
+from rubhpc import LumpedStator
 from rubhpc.integrate import case
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
 from rubhpc.integrate.scheme import Scheme

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from bent_stator import solve, squared_slope
 from calling import interpreted
+from closed_form import read_rig, simulate
 from scipy.integrate import quad
 from test_contact_stepping_march import CLOSE, MOTIONS, RUB, distance
 from trial_rig import trial_rig
 
-from rubhpc import InputError, read_rig, simulate
+from rubhpc import InputError
 from rubhpc.fem.beam import stator_foreshortening
 from rubhpc.integrate import case
 from rubhpc.integrate.marches import curved as curved_march
@@ -19,7 +20,7 @@ from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
 from rubhpc.integrate.scheme import Scheme
 from rubhpc.kernels import curved_levels
 from rubhpc.rig.reading import with_keys
-from rubhpc.rig.stators import LumpedStator, Stator
+from rubhpc.rig.stators import LumpedStator
 
 UPDATED = RUB | {"normal": "updated"}
 SLENDER = {"height": 0.003, "geometry": "second_order"}  # bends by a twentieth of its length
@@ -144,15 +145,18 @@ def test_foreshortening_ratio_is_of_what_the_gap_leaves_out(normal, geometry):
 
 def test_bent_stator_needs_what_it_needs():
     rig = trial_rig(1, geometry="second_order")
-    for given in ({"method": "central-difference"}, {"law": "penalty", "stiffness": 1e8}):
-        with pytest.raises(InputError, match="geometry: second_order needs"):
-            simulate(rig, **RUB, **given)
+    with pytest.raises(InputError, match="geometry: second_order needs"):
+        simulate(rig, **RUB, law="penalty", stiffness=1e8)
+    with pytest.raises(
+        InputError, match=r'method: central-difference .* add \[contact\] model = "mokhtar2017"'
+    ):
+        simulate(rig, **RUB, method="central-difference")
     with pytest.raises(InputError, match="friction_law"):
         simulate(rig, **RUB, friction_law="coulomb")
-    for given in ({"lateral": False}, {"carrier": "casing"}):
-        with pytest.raises(InputError, match="geometry"):
-            Stator(node=1, length=0.04, width=0.005, height=0.005, youngs_modulus=3e9, density=1e3,
-                   geometry="second_order", **given)  # fmt: skip
+    with pytest.raises(InputError, match="geometry"):
+        trial_rig(1, geometry="second_order", carrier="casing")
+    assert trial_rig(1, geometry="second_order").stator[0].is_bent
+    assert not trial_rig(1, geometry="second_order", lateral=False).stator[0].is_bent
     with pytest.raises(TypeError):
         LumpedStator(node=1, rigid=True, geometry="second_order")
 

@@ -8,10 +8,11 @@ from functools import partial
 
 import numpy as np
 import pytest
+from closed_form import Contact, read_rig, simulate
 from record_distance import MOTIONS
 from trial_rig import trial_rig, turn
 
-from rubhpc import State, read_rig, simulate
+from rubhpc import State
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import steady_response
@@ -32,7 +33,7 @@ from rubhpc.rig.rig import Rig
 from rubhpc.rig.rotors import Rotor, Unbalance
 from rubhpc.rig.stators import LumpedStator
 from rubhpc.schema import DIVERGED, DONE, SCHEMES
-from rubhpc.study.study import Contact, Integrator, Recording
+from rubhpc.study.study import Integrator, Recording
 
 SPEED = 170.0
 RUB = {"speed": SPEED, "clearance": "80 um", "friction": 0.2, "transient": 1, "revolutions": 2}

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from closed_form import Contact
 from trial_rig import trial_rig
 
 from rubhpc import State
@@ -13,7 +14,7 @@ from rubhpc.integrate.setup import prepare
 from rubhpc.kernels._jit import plain
 from rubhpc.kernels.friction_change import state_by_forces
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, STUCK, state_of
-from rubhpc.study.study import Contact, Integrator
+from rubhpc.study.study import Integrator
 
 PER_REVOLUTION = 64
 

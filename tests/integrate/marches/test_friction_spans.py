@@ -4,15 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import Contact, simulate
 from trial_rig import trial_rig
 
-from rubhpc import LumpedStator, State, simulate
+from rubhpc import LumpedStator, State
 from rubhpc.integrate.marches.friction import FrictionMarch
 from rubhpc.integrate.measuring.samples import empty_samples, new_accumulator
 from rubhpc.integrate.reduced_model.friction_mode import states_of
 from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.friction_states import OPEN, STUCK
-from rubhpc.study.study import Contact, Integrator
+from rubhpc.study.study import Integrator
 
 PER_REVOLUTION, N_REVOLUTION = 64, 3
 CASE = {"speed": 120.0, "clearance": "20 um", "friction": 0.6, "friction_law": "coulomb"}

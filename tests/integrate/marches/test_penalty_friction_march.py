@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from closed_form import Contact, simulate
 from record_distance import largest_difference
 from trial_rig import trial_rig
 
-from rubhpc import State, simulate
+from rubhpc import State
 from rubhpc.integrate import case
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
@@ -14,7 +15,7 @@ from rubhpc.integrate.scheme import Scheme
 from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, state_of
 from rubhpc.schema import SCHEMES
-from rubhpc.study.study import Contact, Integrator
+from rubhpc.study.study import Integrator
 
 PENALTY = {"law": "penalty", "stiffness": 1e7, "friction_law": "coulomb"}
 WHIP = {"speed": 120.0, "clearance": "20 um", "friction": 0.6} | PENALTY  # of the trial rig

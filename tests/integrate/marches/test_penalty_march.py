@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from closed_form import Contact, periodic, read_rig, simulate
 from record_distance import largest_difference
 
-import rubhpc
-from rubhpc import State, read_rig, simulate
+from rubhpc import State
 from rubhpc.integrate import case
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
@@ -14,7 +14,7 @@ from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.penalty_events import change_pressed, pressed_pairs
 from rubhpc.rig.reading import with_keys
 from rubhpc.schema import REGIME, SCHEMES
-from rubhpc.study.study import Contact, Integrator
+from rubhpc.study.study import Integrator
 
 STIFF = with_keys(read_rig("mokhtar2017"), {"stator.youngs_modulus": 3e10})
 HARD = {"speed_ratio": 1.1, "clearance": "100 um", "law": "penalty", "stiffness": 1e8, "damping": 500.0}
@@ -40,7 +40,7 @@ def test_short_steps_come_to_the_closed_form_as_they_are_halved(monkeypatch):
 def test_shooting_meets_the_motion_and_its_decay():
     """A touch jumps by the damper's force: without its saltation matrix the multipliers would be off."""
     given = {"speed_ratio": 0.75, "clearance": "100 um", "law": "penalty", "stiffness": 1e8, "damping": 2e3}
-    solved = rubhpc.periodic("mokhtar2017", **given, period=2)
+    solved = periodic("mokhtar2017", **given, period=2)
     assert solved.is_stable
     assert [event.kind for event in solved.events] == ["touch", "release"] * (len(solved.events) // 2)
     settled = simulate("mokhtar2017", **given, transient=240, revolutions=16)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from closed_form import Contact, read_rig
 
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import first_lateral_frequency
@@ -11,8 +12,7 @@ from rubhpc.integrate.setup import prepare
 from rubhpc.integrate.start import at_rest
 from rubhpc.integrate.transient import idle_of, pass_revolutions
 from rubhpc.kernels.case_progress import CONTACT_UNSOLVED
-from rubhpc.rig.reading import read_rig
-from rubhpc.study.study import Contact, Integrator, Recording
+from rubhpc.study.study import Integrator, Recording
 
 N, CLEARANCE = 12, 84e-6
 RECORDING = Recording(samples_per_revolution=64)

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import read_rig, simulate
 
-from rubhpc import read_rig, simulate
 from rubhpc.rig.parts import Bearing
 from rubhpc.rig.reading import with_keys
 from rubhpc.validity import MONITORS, counted, words

@@ -6,19 +6,19 @@ from itertools import islice
 
 import numpy as np
 import pytest
+from closed_form import Contact, read_rig, simulate
 from impact_map import RESTITUTION, next_impact
 from scipy.optimize import fsolve
 
-from rubhpc import LumpedStator, Rig, State, Unbalance, simulate
+from rubhpc import LumpedStator, Rig, State, Unbalance
 from rubhpc.integrate.lyapunov import N_ALIGNING, Growth, Marches
 from rubhpc.integrate.marches.central_difference import CentralDifferenceMarch
 from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.setup import prepare
 from rubhpc.integrate.tangent_motion import TangentMotion
-from rubhpc.rig.reading import read_rig
 from rubhpc.schema import REGIME
-from rubhpc.study.study import Contact, Integrator, Recording
+from rubhpc.study.study import Integrator, Recording
 
 MARCHES = {
     "modal": EventDrivenMarch,

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from closed_form import simulate
 
-from rubhpc import simulate
 from rubhpc.integrate.measuring.orbit_measures import period
 from rubhpc.integrate.measuring.settling import BLOCK, UNKNOWN, halves, heard, is_steady, settled
 

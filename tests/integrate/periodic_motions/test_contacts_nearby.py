@@ -4,11 +4,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from closed_form import simulate
 
 from rubhpc.integrate.periodic_motions import direct
 from rubhpc.integrate.periodic_motions.approach import Approach
 from rubhpc.integrate.periodic_motions.contacts_nearby import PER_REVOLUTION, ContactsNearby
-from rubhpc.simulate import simulate
 
 
 @pytest.fixture(scope="module")

@@ -5,15 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import Contact, periodic, simulate
 from impact_map import RESTITUTION, next_impact
 
 import rubhpc
-from rubhpc import LumpedStator, Rig, State, Unbalance, simulate
+from rubhpc import LumpedStator, Rig, State, Unbalance
 from rubhpc.errors import InputError
 from rubhpc.integrate.periodic_motions.lyapunov_spectrum import exponents, kaplan_yorke_dimension
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.setup import prepare
-from rubhpc.study.study import Contact, Integrator, Recording
+from rubhpc.study.study import Integrator, Recording
 
 SPIN = 2.8  # period doublings have led to chaos there
 
@@ -136,7 +137,7 @@ def test_periodic_motion_has_the_logarithms_of_its_multipliers():
     """But for what the displacements still turn in 256 revolutions, each by a share of 1/256."""
     case = {"speed_ratio": 0.75, "clearance": "100 um", "keep": ()}
     record = simulate("mokhtar2017", transient=300, revolutions=16, lyapunov=3, **case)
-    motion = rubhpc.periodic("mokhtar2017", period=2, **case)
+    motion = periodic("mokhtar2017", period=2, **case)
     assert exponents_of(record, 3) == pytest.approx(np.log(np.abs(motion.multipliers[:3])) / 2, abs=1e-2)
     assert record.kaplan_yorke_dimension == 0.0
 

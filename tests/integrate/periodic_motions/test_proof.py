@@ -1,15 +1,15 @@
 """The proof of a record that begins on a motion that was solved for, or looks like another one."""
 
 import pytest
+from closed_form import Contact, periodic, simulate
 from overhung_pump import pump
 from trial_rig import trial_rig
 
-from rubhpc import periodic, simulate
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.periodic_motions import proof
 from rubhpc.integrate.setup import prepare
 from rubhpc.schema import REGIME
-from rubhpc.study.study import Contact, Integrator
+from rubhpc.study.study import Integrator
 
 TWICE = {
     "speed_ratio": 3.0, "clearance_ratio": 0.5, "friction": 0.2, "overrides": {"rotor.damping.alpha": 4.0},

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import Contact, read_rig
 from trial_rig import trial_rig
 
 from rubhpc import LumpedStator
@@ -14,8 +15,8 @@ from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.periodic_motions.saltation import monodromy
 from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.flow import RATE_BEGUN, RATE_ENDED
-from rubhpc.rig.reading import read_rig, with_keys
-from rubhpc.study.study import Contact, Integrator, Recording
+from rubhpc.rig.reading import with_keys
+from rubhpc.study.study import Integrator, Recording
 
 PAPER = read_rig("mokhtar2017")
 SPRINGS = LumpedStator(node=8, radius=0.06, count=8, mass=1e-3, damping=2.0, stiffness=1e5)

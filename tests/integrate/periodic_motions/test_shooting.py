@@ -7,8 +7,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from closed_form import periodic, read_rig, simulate
 
-import rubhpc
 from rubhpc.errors import NoPeriodicMotion
 from rubhpc.integrate import periodic_motion
 from rubhpc.integrate.periodic_motions.shooting import NEAR_GRAZING, _grazing, shoot
@@ -28,20 +28,20 @@ def test_limit_that_is_reached_is_named(monkeypatch, limit, text):
     monkeypatch.setattr(periodic_motion, "shoot", partial(shoot, **limit))
     monkeypatch.setattr(periodic_motion, "SPANS", ())
     with pytest.raises(NoPeriodicMotion, match=text):
-        rubhpc.periodic("mokhtar2017", **CASE)
+        periodic("mokhtar2017", **CASE)
 
 
 def test_motion_that_the_last_step_closes_is_found(monkeypatch):
-    needed = rubhpc.periodic("mokhtar2017", **CASE).iterations
+    needed = periodic("mokhtar2017", **CASE).iterations
     assert needed > 1
     monkeypatch.setattr(periodic_motion, "SPANS", ())
     for allowed in (needed, needed - 1):
         monkeypatch.setattr(periodic_motion, "shoot", partial(shoot, most_iterations=allowed))
         if allowed < needed:
             with pytest.raises(NoPeriodicMotion, match="no convergence"):
-                rubhpc.periodic("mokhtar2017", **CASE)
+                periodic("mokhtar2017", **CASE)
         else:
-            assert rubhpc.periodic("mokhtar2017", **CASE).iterations == needed
+            assert periodic("mokhtar2017", **CASE).iterations == needed
 
 
 def test_contact_that_grazes_is_named():
@@ -73,7 +73,7 @@ def test_motion_that_has_just_touched_grazes(speed_ratio, clearance_ratio, resti
     with pytest.raises(
         NoPeriodicMotion, match=r"a contact grazes, its speed of approach is .*e-0[56] m/s; give"
     ):
-        rubhpc.periodic(
+        periodic(
             "mokhtar2017", speed_ratio=speed_ratio, clearance_ratio=clearance_ratio, friction=friction,
             restitution=restitution, period=period, transient=1, initial={"from": "contact_free"}, keep=(),
             samples_per_revolution=32, accuracy=2e-3,
@@ -82,15 +82,15 @@ def test_motion_that_has_just_touched_grazes(speed_ratio, clearance_ratio, resti
 
 def test_whip_of_more_than_a_thousand_events_in_a_slow_revolution(monkeypatch):
     """Three stators are rolled around 105 times, each with a touch, a stick, a slip and a release."""
-    rig = rubhpc.read_rig("mokhtar2017")
+    rig = read_rig("mokhtar2017")
     ring = tuple(replace(rig.stator[0], angle=2.0 * math.pi * i / 3) for i in range(3))
     rig = replace(rig, stator=ring)
     case = {
         "speed_ratio": 0.03, "clearance": "3 um", "friction": 0.5, "friction_law": "coulomb", "keep": (),
         "samples_per_revolution": 256,
     }  # fmt: skip
-    whip = rubhpc.simulate(rig, transient=2, revolutions=1, initial={"vertical_velocity": 0.5}, **case)
+    whip = simulate(rig, transient=2, revolutions=1, initial={"vertical_velocity": 0.5}, **case)
     assert whip.contacts_per_revolution.sum() > 250
     monkeypatch.setattr(periodic_motion, "SPANS", ())  # seconds later it is the same
     with pytest.raises(NoPeriodicMotion, match="more than 1000 events in a revolution; give another period"):
-        rubhpc.periodic(rig, initial=whip.final, **case)
+        periodic(rig, initial=whip.final, **case)

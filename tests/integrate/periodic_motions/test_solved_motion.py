@@ -5,16 +5,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from closed_form import Contact, read_rig, simulate
 
-from rubhpc import simulate
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.periodic_motions.approach import Approach
 from rubhpc.integrate.periodic_motions.solved_motion import MOST_KEPT, SolvedMotions, rounded, solved_motions
 from rubhpc.integrate.setup import prepare
-from rubhpc.rig.reading import read_rig, with_keys
+from rubhpc.rig.reading import with_keys
 from rubhpc.schema import REGIME
 from rubhpc.study.initial import Initial
-from rubhpc.study.study import Contact, Integrator, Recording
+from rubhpc.study.study import Integrator, Recording
 
 SPEED, CLEARANCE, FRICTION = 1.5 * 2.0 * math.pi * 31.56, 300e-6, 0.1  # rub and no contact coexist
 SHORT = {"revolutions": 4, "samples_per_revolution": 32, "keep": ("section",)}

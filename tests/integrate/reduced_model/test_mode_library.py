@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from calling import called
+from closed_form import Contact
 from scipy.linalg import expm
 from trial_rig import trial_rig
 
@@ -30,7 +31,7 @@ from rubhpc.kernels.contact_modes import (
 )
 from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.measuring import energies_gained
-from rubhpc.study.study import Contact, Integrator
+from rubhpc.study.study import Integrator
 
 energies_gained = called(energies_gained)
 enter = called(enter)

@@ -5,10 +5,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from closed_form import read_rig
 from scipy.linalg import block_diag, eigvals
 from trial_rig import trial_rig
 
-from rubhpc import read_rig
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import steady_response

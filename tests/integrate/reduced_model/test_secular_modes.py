@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import Contact as Law
 from overhung_pump import SEGMENT, pump
 
 from rubhpc import LumpedStator
@@ -14,7 +15,6 @@ from rubhpc.integrate.reduced_model.secular_modes import Closings, Contact, Eige
 from rubhpc.integrate.reduced_model.system_modes import modes_of
 from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, STUCK
-from rubhpc.study.study import Contact as Law
 from rubhpc.study.study import Integrator
 
 N = 40

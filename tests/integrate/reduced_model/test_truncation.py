@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_form import simulate
 from random_machines import random_machine
 from random_rigs import PACKAGED, found_error, random_rig
 
-from rubhpc import simulate
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.probes import with_probes
 from rubhpc.integrate.reduced_model import truncation
