@@ -65,11 +65,9 @@ Complexes = NDArray[np.complex128]
 Ints = NDArray[np.int64]
 
 STEPPING, TRYING, SETTLING = range(3)  # what is to be done next while a pair is closed
-ALLOWED = 3.0  # error of the forces of a step over the accuracy
+ALLOWED = 2.0  # error of the forces of a step over the accuracy
 NEWTON = 0.03  # tolerance of the forces in Newton's method, over that of the steps
-AVERAGED = (
-    20e-6  # s: an error of the force in a shorter step counts as the error of its impulse over that time
-)
+AVERAGED = 20e-6  # s: the error of a shorter step counts as that of its impulse over that time
 BEGINNING = 1.0 / 125.0  # first step of a contact over the last contact of the pair
 GROWING = 60.0  # steps are doubled where their error is so much less than the tolerance
 LEAST_SCALE = 1e-3  # N, of forces

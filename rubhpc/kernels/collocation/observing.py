@@ -42,6 +42,9 @@ Complexes = NDArray[np.complex128]
 Ints = NDArray[np.int64]
 
 
+N_LOOK = 8  # parts of a step in which the least slip is looked for
+
+
 class Signals(Struct):
     """Output rows, in the order of `contact_modes.N_ROTOR_ROW`, and rows of powers; o rows, k slots.
 
@@ -433,10 +436,9 @@ def record_contact(
     worked = 0.0
     for k in range(s):
         part[k] = solution.seen[i * s + k, SLIP]
-    lowest = min(part[0], value_at(nodes, part, share))
-    for k in range(s):
-        if nodes.at[k] < share:
-            lowest = min(lowest, part[k])
+    lowest = part[0]
+    for k in range(1, N_LOOK + 1):
+        lowest = min(lowest, value_at(nodes, part, share * k / N_LOOK))
     if state[i] != STICKING:
         for k in range(s):
             part[k] *= t[k]
