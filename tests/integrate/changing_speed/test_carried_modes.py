@@ -13,9 +13,9 @@ from rubhpc.integrate.changing_speed.passing import Passing
 DRIVE = {"torque": 0.3, "inertia": 2e-3, "lowest": 20.0, "start": 250.0, "revolutions": 8}
 
 
-def whip_of(monkeypatch, count, **changed):
+def whip_of(monkeypatch, count):
     """A drive in a ring, and how much of its velocity each change of range takes, by pairs closed."""
-    rig = trial_rig(1, **changed)
+    rig = trial_rig(1)
     ring = tuple(replace(rig.stator[0], angle=0.3 + 2.0 * math.pi * i / count) for i in range(count))
     changes, goes_over = [], Passing.goes_over
 
@@ -38,7 +38,6 @@ def whip_of(monkeypatch, count, **changed):
         clearance=3e-5,
         friction=0.2,
         pieces_per_revolution=8,
-        normal="updated" if changed else "fixed",
     )
     return found, np.array(changes)
 
@@ -48,13 +47,4 @@ def test_modes_of_equal_stators_are_not_taken_for_one_another(monkeypatch):
     found, changes = whip_of(monkeypatch, 8)
     assert changes[:, 0].max() >= 3
     assert changes[:, 1].max() < 2e-3
-    assert found.energy_residual < 1e-6
-
-
-def test_bent_stators_that_press_go_on_with_the_motion_as_it_is(monkeypatch):
-    """What their curved gaps add to a motion goes with it."""
-    found, changes = whip_of(monkeypatch, 4, geometry="second_order")
-    closed = changes[:, 0] > 0
-    assert closed.any()
-    assert not changes[closed, 1].any()
     assert found.energy_residual < 1e-6

@@ -150,6 +150,7 @@ def test_endless_events_are_left_to_collocation(monkeypatch, too_many):
         monkeypatch.setattr(met_modes, "MOST_REFILLS", 1)
     else:
         monkeypatch.setattr(event_driven_march, "advance", lambda *_: CONTACT_UNSOLVED)
+    forget()
     left = simulate(trial_rig(3), **CLOSE)
     assert left.status == DONE
     assert (SCHEMES[exact.scheme], exact.left_closed_form) == ("event_driven", 0)
