@@ -3,16 +3,22 @@
 import math
 from dataclasses import replace
 
+import corpus
 import numpy as np
 import pytest
 from bent_stator import solve, squared_slope
-from closed_form import read_rig, simulate
+from closed_form import read_rig, run_up, simulate
 from record_distance import MOTIONS
 from trial_rig import trial_rig
 
+import rubhpc
 from rubhpc import InputError
 from rubhpc.fem.beam import stator_foreshortening
+from rubhpc.integrate import case
 from rubhpc.integrate.marches import collocation
+from rubhpc.integrate.marches.event_driven import EventDrivenMarch
+from rubhpc.integrate.scheme import Scheme
+from rubhpc.recent import forget
 from rubhpc.rig.reading import with_keys
 from rubhpc.rig.stators import LumpedStator
 
@@ -194,3 +200,134 @@ def test_without_lateral_freedom_normals_turn_with_the_disc_alone():
     known = simulate(rig, **given, method="central-difference", step="0.25 us")
     assert distance(found, known, MOTIONS[:4]) < 2e-4
     assert not found.stator_lateral.any()
+
+
+def by(march, name, **given):
+    """Four revolutions of a case of the corpus by a march."""
+    _, machine, law, keys = corpus.CASES[name]
+    keys = {"transient": 0, "samples_per_revolution": 64, "keep": ("waveform",)} | keys
+    keys |= law | {"revolutions": 4} | given
+    rig = corpus.machine(machine).with_geometry(keys.pop("geometry"))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(case.MARCHES, Scheme.EVENT_DRIVEN, march)
+        return rubhpc.simulate(rig, **keys)
+
+
+def both(name, **given):
+    """A case by collocation and in closed form."""
+    return by(collocation.CollocationMarch, name, **given), by(EventDrivenMarch, name, **given)
+
+
+SMOOTH = ("sliding, below", "sliding, gravity", "sliding, tabulated", "sliding, pump", "coulomb, below")
+SMOOTH += ("coulomb, above", "coulomb, slow rim", "coulomb, tabulated", "static ratio", "penalty, below")
+SMOOTH += ("penalty, tabulated", "penalty and coulomb", "restitution, lone", "restitution and coulomb, lone")
+BOUNCING = ("sliding, two", "sliding, three", "sliding, reversed", "sliding, ring of 8")
+BOUNCING += ("sliding, ring of 16", "sliding, carried", "sliding, pump in 8", "coulomb, two")
+BOUNCING += ("coulomb, reversed", "coulomb, carried", "coulomb, lone, soft", "coulomb, ring of 8")
+BOUNCING += ("coulomb, ring of 16", "coulomb, pump in 8", "restitution, below", "restitution and coulomb")
+BOUNCING += ("penalty, ring of 8", "penalty and coulomb, ring of 8")
+
+
+@pytest.mark.parametrize("name", SMOOTH + BOUNCING)
+def test_a_fixed_normal_is_that_of_the_closed_form(name):
+    """Every law and machine; bounces within a share of a contact may be counted otherwise."""
+    found, known = both(name, accuracy=1e-4)
+    assert known.contact_impulse.any()
+    for signal in (*MOTIONS, "contact_force"):
+        one, other = found.signals[signal], known.signals[signal]
+        assert one == pytest.approx(other, rel=0, abs=1e-3 * abs(other).max()), signal
+    for measure in ("contact_impulse", "friction_work", "peak_contact_force"):
+        one, other = getattr(found, measure), getattr(known, measure)
+        assert one == pytest.approx(other, rel=0, abs=1e-3 * abs(other).max()), measure
+    assert found.contact_fraction == pytest.approx(known.contact_fraction, abs=1e-3)
+    assert found.stick_fraction == pytest.approx(known.stick_fraction, abs=1e-3)
+    if name in SMOOTH:
+        assert found.contacts_per_revolution == pytest.approx(known.contacts_per_revolution)
+        assert found.reversals_per_revolution == pytest.approx(known.reversals_per_revolution)
+
+
+@pytest.mark.parametrize("name", ["sliding, walls", "coulomb, walls", "penalty, walls", "restitution, walls"])
+def test_walls_are_those_of_the_closed_form(name):
+    """For a revolution: rounding grows by ten in two. Contacts that part within tolerance do not chatter."""
+    found, known = both(name, accuracy=1e-4, revolutions=1)
+    for signal in MOTIONS[:3]:
+        one, other = found.signals[signal], known.signals[signal]
+        assert one == pytest.approx(other, rel=0, abs=1e-3 * abs(other).max()), signal
+    assert found.contact_impulse == pytest.approx(known.contact_impulse, rel=1e-3)
+    assert found.steps < 10_000
+
+
+@pytest.mark.parametrize("name", ["penalty, below", "penalty and coulomb"])
+def test_springs_without_dampers_are_those_of_the_closed_form(name):
+    found, known = both(name, accuracy=1e-4, damping=0.0)
+    for signal in (*MOTIONS, "contact_force"):
+        one, other = found.signals[signal], known.signals[signal]
+        assert one == pytest.approx(other, rel=0, abs=1e-3 * abs(other).max()), signal
+    assert found.contacts_per_revolution == pytest.approx(known.contacts_per_revolution)
+
+
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-4, 1e-5])
+@pytest.mark.parametrize("name", ["sliding, below", "coulomb, above", "penalty, below", "coulomb, ring of 8"])
+def test_energy_balances_as_well_as_forces_are_accurate(name, accuracy):
+    assert by(collocation.CollocationMarch, name, accuracy=accuracy).energy_residual < accuracy
+
+
+def test_elastic_impacts_keep_the_energy():
+    """A mass between two walls, without damping."""
+    wall = {"node": 1, "radius": 1.0, "rigid": True}
+    rig = rubhpc.Rig.from_matrices(
+        [[1.0]], None, [[4.0]], degrees=[(1, "v")],
+        stators=[LumpedStator(angle=angle, **wall) for angle in (0.0, math.pi)],
+    )  # fmt: skip
+    given = {"speed": 3.0, "clearance": 1e-2, "friction": 0.0, "restitution": 1.0, "normal": "updated"}
+    record = simulate(rig, **given, initial={"vertical_velocity": 1.0}, transient=0, revolutions=4)
+    assert record.contacts_per_revolution == pytest.approx([2 * math.pi / 3 / 4e-2] * 2, rel=0.02)
+    energy = 0.5 * record.final.rotor_velocity[0] ** 2 + 2.0 * record.final.rotor_displacement[0] ** 2
+    assert energy == pytest.approx(0.5, rel=1e-10)
+
+
+def test_cases_before_change_no_bit():
+    """Tables that other cases have filled, and matrices of other contacts."""
+    given = CLOSE | {"normal": "updated", "friction_law": "coulomb", "keep": ("waveform",)}
+    alone = simulate(trial_rig(3), **given)
+    forget()
+    for clearance in ("60 um", "30 um"):
+        simulate(trial_rig(3), **given | {"clearance": clearance})
+    again = simulate(trial_rig(3), **given)
+    for name, signal in alone.signals.items():
+        assert again.signals[name].tobytes() == signal.tobytes(), name
+    assert again.steps == alone.steps
+    assert again.energy_residual == alone.energy_residual
+
+
+STRIBECK = {"friction_law": "stribeck", "static_friction_ratio": 1.0, "stribeck_speed": 0.1}
+
+
+@pytest.mark.parametrize("rig", [trial_rig(1, radius=5e-4), trial_rig(3)], ids=["slow rim", "three"])
+def test_stribecks_law_without_an_excess_is_coulombs(rig):
+    """Its coefficient is constant; it has no closed form, and Coulomb's has."""
+    given = CLOSE | {"speed": 120.0, "friction": 0.6, "clearance": "20 um", "accuracy": 1e-4}
+    found = simulate(rig, **given, **STRIBECK)
+    known = simulate(rig, **given, friction_law="coulomb")
+    assert known.stick_fraction.max() > 0.05
+    for name in (*MOTIONS, "contact_force"):
+        one, other = getattr(found, name), getattr(known, name)
+        assert one == pytest.approx(other, rel=0, abs=1e-3 * abs(other).max()), name
+    assert found.stick_fraction == pytest.approx(known.stick_fraction, abs=1e-3)
+
+
+RUN_UP = {"start": 185.0, "stop": 209.0, "time": 0.4}
+DRIVE = {"drive": {"torque": 0.3, "inertia": 2e-3, "lowest": 20.0, "start": 200.0, "revolutions": 10}}
+
+
+@pytest.mark.parametrize("law", [RUN_UP, DRIVE], ids=["run-up", "drive"])
+def test_a_run_up_is_that_of_the_closed_form(law):
+    given = law | {"clearance": "60 um", "friction": 0.2, "samples_per_revolution": 64, "accuracy": 1e-4}
+    found = run_up(trial_rig(2), **given, **STRIBECK)
+    known = run_up(trial_rig(2), **given, friction_law="coulomb")
+    assert np.count_nonzero(known.contact_fraction) > 5
+    for name in ("speed", "vertical", "horizontal", "torsion", "stator_axial", "contact_force"):
+        one, other = found[name].values, known[name].values
+        assert one == pytest.approx(other, rel=0, abs=1e-3 * np.abs(other).max()), name
+    work = known.friction_work.values
+    assert found.friction_work.values == pytest.approx(work, rel=0, abs=1e-3 * work.max())
