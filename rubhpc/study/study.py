@@ -39,7 +39,7 @@ from rubhpc.study.refine import Refine
 from rubhpc.study.run_up_keys import RunUpKeys, check_run_up, refuse_speeds, speed_axis
 from rubhpc.study.sampling import draw
 from rubhpc.study.state_of_case import with_state
-from rubhpc.study.tables import Integrator, Recording, Run, Sample, check_bent
+from rubhpc.study.tables import Integrator, Recording, Run, Sample, check_method
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -324,9 +324,8 @@ class Study:
                 is_bent=self.has_bent_stator,
             )
         check_rigs(self.rig, self.axes, self.recording.probe)
-        if self.has_bent_stator:
-            for contact in contacts:
-                check_bent(contact, self.integrator)
+        for contact in contacts:
+            check_method(contact, self.integrator, is_bent=self.has_bent_stator)
 
     @property
     def has_bent_stator(self) -> bool:

@@ -71,25 +71,23 @@ class Integrator:
         return self.step if self.step is not None else min(PAPER_STEP, SAFE_SHARE * limit)
 
 
-def check_bent(contact: Contact, integrator: Integrator) -> None:
-    """Refuse laws and integrators that do not know a stator of second-order geometry.
+def check_method(contact: Contact, integrator: Integrator, *, is_bent: bool = False) -> None:
+    """Refuse what the central difference does not know: second-order stators and Hertz's law.
 
     Raises
     ------
     InputError
         Says what it needs instead.
     """
-    if integrator.method != "modal":
+    if integrator.method == "modal":
+        return
+    if is_bent:
         problem = f"{integrator.method} needs stators of linear geometry"
         fix = 'add [contact] model = "mokhtar2017", or [override] "stator.geometry" = "linear"'
         raise InputError(f"[integrator] method: {problem}; {fix}")
-    needed = {
-        '[contact] law = "lagrange"': contact.law == "lagrange",
-        '[contact] friction_law = "sliding"': contact.friction_law == "sliding",
-    }
-    for text, is_met in needed.items():
-        if not is_met:
-            raise InputError(f'[stator] geometry: second_order needs {text}; set it, or geometry = "linear"')
+    if contact.law == "hertz":
+        problem = f'{integrator.method} does not know law = "hertz"'
+        raise InputError(f'[integrator] method: {problem}; set law = "penalty", or method = "modal"')
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,8 +17,6 @@ from rubhpc.kernels.collocation.structures import (
     ALONG,
     BENDING,
     FIXED,
-    HARD,
-    PENALTY,
     ROUND,
     TWIST,
     Bodies,
@@ -28,7 +26,7 @@ from rubhpc.kernels.collocation.structures import (
 )
 from rubhpc.kernels.contact_modes import LATERAL_RATE, LATERAL_ROW, N_ROTOR_ROW
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, TORSION, V, W, rim_sense
-from rubhpc.kernels.laws import STRIBECK, TABLE, is_set_valued
+from rubhpc.kernels.laws import LAGRANGE, STRIBECK, TABLE, is_set_valued
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -177,7 +175,7 @@ class FlightModes:
             aside=self.sense * sag_at_stators(setup.model)[1],
             rim_speed=radius * abs(setup.spin),
             friction=np.zeros(q),
-            normal_law=np.full(q, self.normal_law),
+            normal_law=np.full(q, law.normal_law),
             stiffness=np.full(q, law.stiffness),
             damping=np.full(q, law.damping),
             restitution=np.full(q, law.restitution),
@@ -188,15 +186,10 @@ class FlightModes:
             displacement_limit=setup.displacement_limit,
         )
 
-    @property
-    def normal_law(self) -> int:
-        """Law of the normal force."""
-        return PENALTY if self.setup.law.stiffness > 0.0 else HARD
-
     @cached_property
     def nodes(self) -> Nodes:
         """Nodes of a step."""
-        return lobatto_nodes(NODES_HARD if self.normal_law == HARD else NODES_SPRING)
+        return lobatto_nodes(NODES_HARD if self.setup.law.normal_law == LAGRANGE else NODES_SPRING)
 
     @cached_property
     def tables(self) -> Tables:

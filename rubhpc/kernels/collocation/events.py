@@ -12,10 +12,8 @@ from rubhpc.kernels.collocation.observing import value_at
 from rubhpc.kernels.collocation.structures import (
     FRICTION,
     GAP,
-    HARD,
     NORMAL,
     OPEN,
-    PENALTY,
     RATE,
     SLIP,
     STICKING,
@@ -24,6 +22,7 @@ from rubhpc.kernels.collocation.structures import (
     Solution,
 )
 from rubhpc.kernels.collocation.tables import rate_row
+from rubhpc.kernels.laws import LAGRANGE, PENALTY
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -100,7 +99,7 @@ def fill_events(
                 if bodies.normal_law[i] == PENALTY:
                     event[i, NORMAL, k] += bodies.damping[i] / bodies.stiffness[i] * max(rate, 0.0)
                 continue
-            if bodies.normal_law[i] == HARD:
+            if bodies.normal_law[i] == LAGRANGE:
                 event[i, NORMAL, k] = force[i, NORMAL, k]
             else:
                 event[i, NORMAL, k] = spring_end(bodies, i, solution.seen[row, GAP], solution.seen[row, RATE])

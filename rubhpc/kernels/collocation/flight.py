@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.collocation.gaps import see_gap
-from rubhpc.kernels.collocation.structures import PENALTY, Bodies, CaseState, Solution
+from rubhpc.kernels.collocation.structures import Bodies, CaseState, Solution
 from rubhpc.kernels.collocation.tables import turn_freely
 from rubhpc.kernels.coordinate_steps import floor_log2
+from rubhpc.kernels.laws import PENALTY
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

@@ -11,7 +11,6 @@ from rubhpc.kernels.collocation.laws import friction_ratio, spring_force
 from rubhpc.kernels.collocation.newton import factorise, solve_factorised
 from rubhpc.kernels.collocation.structures import (
     FRICTION,
-    HARD,
     NORMAL,
     OPEN,
     RATE,
@@ -20,6 +19,7 @@ from rubhpc.kernels.collocation.structures import (
     Bodies,
     Solution,
 )
+from rubhpc.kernels.laws import LAGRANGE
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -95,7 +95,7 @@ def find_forces(bodies: Bodies, s: int, state: Ints, solution: Solution, force: 
                 both = start[n_row + first + a] * start[n_row + first + b]
                 opening += both * solution.normal_bend[a, b]
                 slipping -= both * solution.tangent_bend[a, b]
-        if bodies.normal_law[i] == HARD:
+        if bodies.normal_law[i] == LAGRANGE:
             wanted[i] = -opening
             for j in range(q):
                 if state[j] != OPEN:
@@ -193,7 +193,7 @@ def impulse_of(
 def is_jammed(bodies: Bodies, s: int, i: int, state: int, solution: Solution) -> bool:
     """Whether a force would press the gap of a sliding pair closed (Painleve): no force then obeys the laws."""
     row = i * s
-    if state == STICKING or state == OPEN or bodies.normal_law[i] != HARD:
+    if state == STICKING or state == OPEN or bodies.normal_law[i] != LAGRANGE:
         return False
     ratio = state * friction_ratio(bodies, i, solution.seen[row, SLIP])[0]
     along = coupling(bodies, solution.normal, row, i, solution.normal, row, i)

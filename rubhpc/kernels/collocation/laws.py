@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from rubhpc.kernels._jit import linked_sum
-from rubhpc.kernels.collocation.structures import HERTZ, Bodies
-from rubhpc.kernels.laws import COULOMB, STRIBECK, TABLE
+from rubhpc.kernels.collocation.structures import Bodies
+from rubhpc.kernels.laws import COULOMB, HERTZ, STRIBECK, TABLE
 
 
 @linked_sum

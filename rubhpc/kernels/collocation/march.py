@@ -45,7 +45,6 @@ from rubhpc.kernels.collocation.structures import (
     BACKWARD,
     FORWARD,
     FRICTION,
-    HARD,
     NORMAL,
     OPEN,
     RATE,
@@ -59,13 +58,14 @@ from rubhpc.kernels.collocation.structures import (
     Tables,
 )
 from rubhpc.kernels.collocation.tables import end_of_step, fill_step, within_step
+from rubhpc.kernels.laws import LAGRANGE
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 Ints = NDArray[np.int64]
 
 STEPPING, TRYING, SETTLING = range(3)  # what is to be done next while a pair is closed
-ALLOWED = 2.0  # error of the forces of a step over the accuracy
+ALLOWED = 3.0  # error of the forces of a step over the accuracy, before the record; in it the accuracy
 NEWTON = 0.03  # tolerance of the forces in Newton's method, over that of the steps
 AVERAGED = 20e-6  # s: the error of a shorter step counts as that of its impulse over that time
 BEGINNING = 1.0 / 125.0  # first step of a contact over the last contact of the pair
@@ -183,7 +183,7 @@ def take_event(
             memory.scale = LEAST_SCALE
         if is_recorded:
             seen.measured.accumulator.n_contact[pair] += 1
-        if bodies.normal_law[pair] == HARD:
+        if bodies.normal_law[pair] == LAGRANGE:
             if not strike(
                 bodies,
                 nodes,
@@ -204,7 +204,7 @@ def take_event(
             memory.slot = slot_within(tables, BEGINNING * case.lasting[pair])
     elif kind == NORMAL:
         state[pair] = OPEN
-        if bodies.normal_law[pair] == HARD:
+        if bodies.normal_law[pair] == LAGRANGE:
             stop_opening(bodies, s, pair, solution, x)
         case.lasting[pair] = (progress.tick - case.since[pair]) * clock.tick
         case.since[pair] = progress.tick
@@ -250,7 +250,7 @@ def strike(
     unseen = max(4.0 * clock.tick * acceleration, 4.0 * math.sqrt(2.0 * GAP_TOLERANCE * acceleration))
     least = max(accuracy * memory.fastest, unseen)
     for i in range(state.size):
-        solution.kept[i] = state[i] != OPEN and i != pair and bodies.normal_law[i] == HARD
+        solution.kept[i] = state[i] != OPEN and i != pair and bodies.normal_law[i] == LAGRANGE
         solution.touching[i] = solution.kept[i] or i == pair
         solution.bound[i] = False
     find_impulses(bodies, s, solution.touching, solution.kept, solution.bound, least, solution)
@@ -363,6 +363,7 @@ def advance_by_collocation(
     """
     s, x, state, after = nodes.at.size, case.x, case.state, solution.after
     n_x, top = x.size, tables.is_filled.size - 1
+    allowed = accuracy if is_recorded else ALLOWED * accuracy
     last_step = progress.n_step + MOST_STEPS
     todo, pair, kind, acceleration = STEPPING, -1, NORMAL, 0.0
     tried, attempt, first_tried, is_still = STICKING, 0, STICKING, False
@@ -478,7 +479,7 @@ def advance_by_collocation(
                     if state[i] != OPEN:
                         for k in range(s):
                             largest = max(largest, abs(solution.guess[i, NORMAL, k]))
-            if n_iteration < 0 or error > ALLOWED * accuracy * largest:
+            if n_iteration < 0 or error > allowed * largest:
                 if slot > 0:
                     memory.slot = slot - 1
                     if n_iteration < 0:
@@ -531,7 +532,7 @@ def advance_by_collocation(
                     taken / whole,
                 )
                 memory.slot = slot
-                if taken == whole and error < ALLOWED * accuracy * largest / GROWING and slot < top:
+                if taken == whole and error < allowed * largest / GROWING and slot < top:
                     memory.slot = slot + 1
             if pair < 0:
                 if is_diverged(bodies, x):

@@ -27,8 +27,6 @@ from rubhpc.kernels.collocation.structures import (
     BY_RATE,
     FRICTION,
     GAP,
-    HARD,
-    HERTZ,
     NORMAL,
     OF_BEND,
     OF_RATE,
@@ -49,6 +47,7 @@ from rubhpc.kernels.collocation.structures import (
     Tables,
 )
 from rubhpc.kernels.collocation.tables import bend_row, rate_row
+from rubhpc.kernels.laws import HERTZ, LAGRANGE
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -174,7 +173,7 @@ def respond(
 def see_pair(bodies: Bodies, nodes: Nodes, i: int, solution: Solution) -> None:
     """Fill what is seen of a closed pair at the nodes, by its gaps there and the velocities of y."""
     s, n_local, n_row = nodes.at.size, bodies.n_local, bodies.load.shape[0]
-    first, is_hard = i * n_local, bodies.normal_law[i] == HARD
+    first, is_hard = i * n_local, bodies.normal_law[i] == LAGRANGE
     for k in range(s):
         row, is_last = i * s + k, k == s - 1
         seen, normal, tangent = solution.seen[row], solution.normal[row], solution.tangent[row]
@@ -221,7 +220,7 @@ def fill_residual(
         see_pair(bodies, nodes, i, solution)
         seen, n, t = solution.seen[i * s : i * s + s], force[i, NORMAL], force[i, FRICTION]
         first, end = seen[0], seen[s - 1]
-        is_hard = bodies.normal_law[i] == HARD
+        is_hard = bodies.normal_law[i] == LAGRANGE
         if is_hard:
             for k in range(1, s):
                 residual[row + k - 1] = seen[k, GAP] - fade[k, 0] * first[GAP] - fade[k, 1] * first[RATE]
@@ -294,7 +293,7 @@ def fill_slopes(
                 solution.ratio[row, RATIO], solution.ratio[row, RATIO_SLOPE] = friction_ratio(
                     bodies, i, seen[SLIP]
                 )
-            if bodies.normal_law[i] != HARD:
+            if bodies.normal_law[i] != LAGRANGE:
                 fill_spring_slopes(bodies, i, row, solution)
                 if is_last and bodies.damping[i] > 0.0:
                     fill_bend_slope(bodies, i, row, v, bend_row(s, n_row) + first, solution)
@@ -358,7 +357,7 @@ def change_pair(
     """
     s, n_local, n_row = nodes.at.size, bodies.n_local, bodies.load.shape[0]
     first = i * n_local
-    is_hard = bodies.normal_law[i] == HARD
+    is_hard = bodies.normal_law[i] == LAGRANGE
     for k in range(first_node, s):
         row, is_last, changed = i * s + k, k == s - 1, solution.changed[k]
         normal, tangent, seen, bent = (
@@ -417,7 +416,7 @@ def change_residual(
     """
     s, fade, step = nodes.at.size, tables.fade[slot], tables.tick * 2.0 ** (tables.first_level + slot)
     changed, n, slope = solution.changed, force[i, NORMAL], solution.slope
-    first, end, is_hard = changed[0], changed[s - 1], bodies.normal_law[i] == HARD
+    first, end, is_hard = changed[0], changed[s - 1], bodies.normal_law[i] == LAGRANGE
     if is_hard:
         for k in range(1, s):
             target[row + k - 1] = changed[k, GAP] - fade[k, 0] * first[GAP] - fade[k, 1] * first[RATE]
@@ -578,7 +577,7 @@ def noise_of(
     for c in range(n_closed):
         i = solution.closed[c]
         for f in range(n_force(bodies, state[i])):
-            if (f == NORMAL and bodies.normal_law[i] == HARD) or (f == FRICTION and state[i] == STICKING):
+            if (f == NORMAL and bodies.normal_law[i] == LAGRANGE) or (f == FRICTION and state[i] == STICKING):
                 for k in range(s):
                     residual[row + k] = ROUNDING * size * (1.0 if k % 2 == 0 else -1.0)
             row += s

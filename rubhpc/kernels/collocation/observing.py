@@ -24,7 +24,6 @@ from rubhpc.kernels.collocation.structures import (
     BACKWARD,
     FORWARD,
     FRICTION,
-    HARD,
     NORMAL,
     RATE,
     SLIP,
@@ -35,6 +34,7 @@ from rubhpc.kernels.collocation.structures import (
     Tables,
 )
 from rubhpc.kernels.collocation.tables import turn_freely, weights
+from rubhpc.kernels.laws import LAGRANGE
 from rubhpc.kernels.sampling import Measured, store_samples, widen_extrema
 
 Floats = NDArray[np.float64]
@@ -448,7 +448,7 @@ def record_contact(
     accumulator.least_slip[i] = min(accumulator.least_slip[i], lowest)
     accumulator.friction_work[i] += worked
     observe_rub(drive, worked, accumulator)
-    if bodies.normal_law[i] != HARD:
+    if bodies.normal_law[i] != LAGRANGE:
         for k in range(s):
             part[k] = n[k] * solution.seen[i * s + k, RATE]
         accumulator.energy[IMPACT_LOSS] -= step * integral_of(nodes, part, 0.0, share)

@@ -27,7 +27,6 @@ Ints = NDArray[np.int64]
 
 ALONG, ACROSS, TWIST, BENDING = range(4)
 FIXED, ROUND = range(2)  # gap: along the axis of the stator, or along the line of centres
-HARD, PENALTY, HERTZ = range(3)  # normal law
 OPEN, FORWARD, BACKWARD, STICKING = 0, 1, -1, 2  # state of a pair; slip is positive in steady sliding
 NORMAL, FRICTION = range(2)  # force of a pair, and event of a pair
 
@@ -61,7 +60,7 @@ class Bodies(Struct):
     aside: Floats  # (q,), of the tip at rest from the axis through the disc, m
     rim_speed: Floats  # (q,), m/s, not negative
     friction: Floats  # (q,), coefficient
-    normal_law: Ints  # (q,)
+    normal_law: Ints  # (q,), of `laws.NORMAL_LAWS`
     stiffness: Floats  # (q,), N/m, or N/m^1.5 of Hertz
     damping: Floats  # (q,), N s/m, or s/m of Hertz
     restitution: Floats  # (q,)
