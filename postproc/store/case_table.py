@@ -100,15 +100,22 @@ def write_table(table: xr.Dataset, path: Path) -> None:
         partial.unlink(missing_ok=True)
 
 
-def _write_parquet(table: xr.Dataset, path: Path) -> None:
+def import_parquet(file: str, instead: str = "") -> tuple[Any, Any]:
+    """Return pyarrow and its Parquet module; InputError with what to do `instead` where there are none."""
     try:
         import pyarrow
         from pyarrow import parquet
     except ImportError as error:
         raise InputError(
-            f"{path.name.removeprefix('.').removesuffix('.part')}: Parquet needs the package {error.name}; "
-            "install it with pip install 'rubhpc[parquet]', or export .csv"
+            f"{file}: Parquet needs the package {error.name}; install it with "
+            f"pip install 'rubhpc[parquet]'{instead}"
         ) from error
+    return pyarrow, parquet
+
+
+def _write_parquet(table: xr.Dataset, path: Path) -> None:
+    file = path.name.removeprefix(".").removesuffix(".part")
+    pyarrow, parquet = import_parquet(file, ", or export .csv")
     arrays, fields = [], []
     for name, column in table.items():
         values = column.values
