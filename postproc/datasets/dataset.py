@@ -23,7 +23,7 @@ from postproc.signals.spectra import check_signal, samples_per_revolution
 from postproc.store.attributes import table_of
 from postproc.store.axes import axes_of, source
 from postproc.store.branch_points import is_of_points
-from postproc.store.case_table import import_parquet
+from postproc.store.case_table import import_parquet, metadata_of
 from postproc.store.run_ups import is_run_up
 from postproc.store.variables import require_results, require_variables
 from rubhpc.errors import InputError, writing
@@ -126,7 +126,7 @@ def write_dataset(
         n_left_out=is_done.size - done.size,
         study=table_of(store, "study"),
         versions=table_of(store, "versions"),
-        about={n: str(store.attrs[n]) for n in ("study", "rig", "versions", "identity") if n in store.attrs},
+        about=metadata_of(store),
     )
     with writing(output, "--output"):
         partial = output.absolute().with_name(f".{output.name}.part")
