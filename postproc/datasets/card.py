@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, field, fields
+import json
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from postproc.datasets.columns import WAVE
@@ -51,32 +52,21 @@ class Made:
 
     Attributes
     ----------
-    title : str
-        Of the study.
+    about : dict of text
+        Title, study, rig, versions and identity of the store.
     columns : list of Column
-        In the order of the files.
     windows : Windows
-    shares : three floats
-        Of the cases for training, validation and test.
     n_left_out : int
         Cases without a result.
-    study, versions : dict
-        Attributes of the store.
-    about : dict of text
-        The same and more, as metadata of the files.
     files : dict of name to (n_case, n_window, n_contact)
         Of each split: its cases and windows, and the windows with contact.
     """
 
-    title: str
+    about: dict[str, str]
     columns: list[Column]
     windows: Windows
-    shares: tuple[float, ...]
     n_left_out: int
-    study: dict[str, Any]
-    versions: dict[str, Any]
-    about: dict[str, str]
-    files: dict[str, tuple[int, int, int]] = field(default_factory=dict)
+    files: dict[str, tuple[int, int, int]]
 
 
 def readme(made: Made) -> str:
@@ -87,15 +77,14 @@ def readme(made: Made) -> str:
     return _README.format(
         files="\n".join(f"  - split: {name}\n    path: {name}.parquet" for name in made.files),
         first=next(iter(made.files)),
-        title=made.title,
-        rig=made.study.get("rig", ""),
+        title=made.about.get("title", "Rub"),
+        rig=json.loads(made.about.get("rig", "{}")).get("name", ""),
         n_sample=windows.n_sample,
         rate=windows.rate,
         duration=typed_quantity(float(f"{windows.n_sample / windows.rate:.4g}"), "s"),
         splits="\n".join(splits),
         n_left_out=made.n_left_out,
         columns="\n".join(columns),
-        version=made.versions.get("rubhpc", ""),
         identity=made.about.get("identity", ""),
         n_draw=windows.n_draw,
         seed=windows.seed,
@@ -137,7 +126,7 @@ that is `out_of_range` solves the equations, but beyond what the model describes
 
 ## How it was made
 
-`rubhpc dataset`, version {version}, from a store with the identity
+`rubhpc dataset`, from a store with the identity
 `{identity}`.
 Study, rig and versions are in the metadata of each Parquet file. Signals were filtered for the sampling rate
 and sampled by a clock. Of each case (and level of the noise) there are {n_draw} windows, which begin at
@@ -178,11 +167,10 @@ def _sensors(windows: Windows) -> list[str]:
             "|---|---|",
             *(f"| `{name}` | {size:.6g} |" for name, size in windows.reference.items()),
         ]
-    plain = Sensor()
+    usual = asdict(Sensor())
     rows = []
     for name, sensor in windows.sensors.items():
-        given = {f.name: getattr(sensor, f.name) for f in fields(sensor)}
-        words = [f"{key} {value}" for key, value in given.items() if value != getattr(plain, key)]
+        words = [f"{key} {value}" for key, value in asdict(sensor).items() if value != usual[key]]
         rows.append(f"| `{name}` | {', '.join(words) or 'ideal'} |")
     return ["| signal | sensor (SI units) |", "|---|---|", *rows]
 
@@ -209,7 +197,7 @@ def croissant(made: Made, folder: Path) -> dict[str, Any]:
         "@context": _CONTEXT,
         "@type": "sc:Dataset",
         "conformsTo": _CROISSANT,
-        "name": made.title,
+        "name": made.about.get("title", "Rub"),
         "description": "Simulated vibration with and without rub between rotor and stator, in windows of "
         f"{windows.n_sample} samples at {windows.rate:g} Hz; SI units.",
         "version": _VERSION,

@@ -20,7 +20,6 @@ from postproc.datasets.windows import Windows
 from postproc.signals.indicators import rms_about_mean
 from postproc.signals.sensors import Sensor, check_rate
 from postproc.signals.spectra import check_signal, samples_per_revolution
-from postproc.store.attributes import table_of
 from postproc.store.axes import axes_of, source
 from postproc.store.branch_points import is_of_points
 from postproc.store.case_table import import_parquet, metadata_of
@@ -50,7 +49,7 @@ def write_dataset(
     rate: float | None = None,
     n_sample: int = N_SAMPLE,
     n_draw: int = N_DRAW,
-    levels: Sequence[float] = LEVELS,
+    levels: Sequence[float] = (),
     sensors: str | Path | None = None,
     shares: Sequence[float] = SHARES,
     seed: int = 1,
@@ -74,7 +73,7 @@ def write_dataset(
     n_sample, n_draw : int
         Samples of a window, and windows of a case at each level of the noise.
     levels : sequence of float
-        White noise as shares of the median rms of each signal in the cases that touch.
+        White noise as shares of the median rms of each signal in the cases that touch; by default 0.05.
     sensors : path, optional
         A file of sensors (`postproc.datasets.sensor_file`) in place of levels.
     shares : three floats
@@ -102,15 +101,14 @@ def write_dataset(
     done = np.flatnonzero(is_done)
     split[done] = split_cases([groups[i] for i in done], cases.touches[done], shares, seed)
     say("reading the level of each signal")
-    given = (
-        read_sensors(sensors, {n: str(w.attrs.get("units", "1")) for n, w in waves.items()})
-        if sensors
-        else None
-    )
+    if sensors and levels:
+        raise InputError("sensors: have noise of their own; remove --noise, or --sensors")
+    units = {name: str(wave.attrs.get("units", "1")) for name, wave in waves.items()}
+    given = read_sensors(sensors, units) if sensors else {}
     windows = Windows(
         sensors=given or dict.fromkeys(waves, Sensor()),
         reference={} if given else _reference(store, waves, is_done, cases.touches),
-        levels=() if given else tuple(levels),
+        levels=() if given else tuple(levels or LEVELS),
         n_draw=n_draw,
         n_sample=n_sample,
         rate=_rate(store, n_sample, rate),
@@ -119,14 +117,11 @@ def write_dataset(
     columns = window_columns(store, waves, has_levels=bool(windows.levels))
     columns += [c for c in cases.columns if c.name not in {own.name for own in columns}]
     made = Made(
-        title=str(store.attrs.get("title", Path(source(store)).stem)),
+        about=metadata_of(store),
         columns=columns,
         windows=windows,
-        shares=tuple(shares),
         n_left_out=is_done.size - done.size,
-        study=table_of(store, "study"),
-        versions=table_of(store, "versions"),
-        about=metadata_of(store),
+        files={},
     )
     with writing(output, "--output"):
         partial = output.absolute().with_name(f".{output.name}.part")
@@ -142,7 +137,7 @@ def write_dataset(
             for flat, case in _cases(store, waves):
                 if is_done[flat]:
                     seen = {name: case[name].values for name in waves}
-                    rows = windows.of_case(case, seen, case[_FORCE].values, keys[flat])
+                    rows = windows.of_case(case, seen, np.atleast_2d(case[_FORCE].values), keys[flat])
                     known = {"case": flat, **cases.of(flat)}
                     files[SPLITS[split[flat]]].add([known | row for row in rows])
                     n_done += 1

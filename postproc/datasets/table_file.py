@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from postproc.datasets.columns import WAVE
 from postproc.store.case_table import import_parquet
 
@@ -19,26 +17,22 @@ _ROWS = 512  # of a group
 
 
 class TableFile:
-    """A file of windows, one a row; unit and meaning of each column are in its metadata.
-
-    Parameters
-    ----------
-    n_sample : int
-        Of a window.
-    about : mapping of text
-        Metadata of the file.
-    """
+    """A file of windows of `n_sample` samples, one a row, with units and meanings in its metadata."""
 
     def __init__(
         self, path: Path, columns: Sequence[Column], n_sample: int, about: Mapping[str, str]
     ) -> None:
         self._arrow, parquet = import_parquet(str(path))
-        self._columns, self._n_sample = columns, n_sample
+        arrow, wave = self._arrow, self._arrow.list_(self._arrow.float32(), n_sample)
         fields = [
-            self._arrow.field(c.name, self._type(c.kind), metadata={"units": c.unit, "long_name": c.meaning})
-            for c in columns
+            arrow.field(
+                column.name,
+                wave if column.kind == WAVE else arrow.type_for_alias(column.kind),
+                metadata={"units": column.unit, "long_name": column.meaning},
+            )
+            for column in columns
         ]
-        self._schema = self._arrow.schema(fields, metadata=dict(about))
+        self._schema = arrow.schema(fields, metadata=about)
         coded = [column.name for column in columns if column.kind != WAVE]  # samples hardly repeat
         self._writer = parquet.ParquetWriter(path, self._schema, compression="zstd", use_dictionary=coded)
         self._rows: list[dict[str, Any]] = []
@@ -53,28 +47,15 @@ class TableFile:
 
     def close(self) -> tuple[int, int, int]:
         """Complete the file; returns its cases, its windows, and those of them with contact."""
-        if self._rows:
-            self._flush()
+        self._flush()
         self._writer.close()
         return len(self._cases), self._n_row, self._n_contact
 
     def _flush(self) -> None:
-        arrays = [self._array(column, [row[column.name] for row in self._rows]) for column in self._columns]
-        self._writer.write_table(
-            self._arrow.table(arrays, schema=self._schema), row_group_size=len(self._rows)
-        )
+        if self._rows:
+            table = self._arrow.Table.from_pylist(self._rows, self._schema)
+            self._writer.write_table(table, row_group_size=len(self._rows))
         self._cases |= {row["case"] for row in self._rows}
         self._n_row += len(self._rows)
         self._n_contact += sum(row["contact"] for row in self._rows)
         self._rows = []
-
-    def _type(self, kind: str) -> Any:
-        if kind == WAVE:
-            return self._arrow.list_(self._arrow.float32(), self._n_sample)
-        return self._arrow.type_for_alias(kind)
-
-    def _array(self, column: Column, values: list[Any]) -> Any:
-        if column.kind == WAVE:
-            flat = self._arrow.array(np.concatenate(values))
-            return self._arrow.FixedSizeListArray.from_arrays(flat, self._n_sample)
-        return self._arrow.array(values, self._type(column.kind))

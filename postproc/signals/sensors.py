@@ -238,8 +238,8 @@ def _turning(case: xr.Dataset) -> tuple[Any, float, int, int]:
     """Revolutions as a function of the time (s), duration of the record, its samples, and those a turn."""
     if not is_run_up(case):
         data = narrow(case, ["spin_speed"])
-        n, rate = samples_per_revolution(case["revolution"]), float(data["spin_speed"]) / (2.0 * math.pi)
-        n_sample = case.sizes["sample"]
+        n, n_sample = samples_per_revolution(case["revolution"]), case.sizes["sample"]
+        rate = abs(float(data["spin_speed"])) / (2.0 * math.pi)
         return (lambda time: time * rate), n_sample / (n * rate), n_sample, n
     turning = narrow(case, ["speed", "time"]).load()
     turning = turning.isel(revolution=np.isfinite(turning["speed"].values))

@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
 from rubhpc.commands.quantity import quantity
 from rubhpc.commands.selection import SELECT, open_cases
 
-_AT_LEAST_1 = click.IntRange(min=1)
+_COUNT: dict[str, Any] = {"show_default": True, "type": click.IntRange(min=1), "metavar": "N"}
 
 
 @click.command()
 @click.argument("store")
 @SELECT
 @click.option(
-    "--output",
-    required=True,
-    type=click.Path(path_type=Path),
-    metavar="DIR",
-    help="A directory that is not there.",
+    "--output", required=True, type=click.Path(path_type=Path), metavar="DIR", help="A new directory."
 )
 @click.option(
     "--signal",
@@ -30,26 +27,15 @@ _AT_LEAST_1 = click.IntRange(min=1)
     help="What sensors see [default: all probes, or vertical, horizontal and torsion].",
 )
 @click.option("--rate", metavar="RATE", help='Such as "5 kHz" [default: the lowest of the stored samples].')
-@click.option(
-    "--samples", default=1024, show_default=True, type=_AT_LEAST_1, metavar="N", help="Of a window."
-)
-@click.option(
-    "--draws",
-    default=10,
-    show_default=True,
-    type=_AT_LEAST_1,
-    metavar="N",
-    help="Windows of a case and level.",
-)
+@click.option("--samples", "n_sample", default=1024, help="Of a window.", **_COUNT)
+@click.option("--draws", "n_draw", default=10, help="Windows of a case and level of the noise.", **_COUNT)
 @click.option(
     "--noise",
     "levels",
     multiple=True,
-    default=(0.05,),
-    show_default=True,
     type=click.FloatRange(min=0.0),
     metavar="LEVEL",
-    help="White noise over the median vibration of cases that touch.",
+    help="White noise over the median vibration of the cases that touch [default: 0.05].",
 )
 @click.option("--sensors", metavar="FILE", help="Sensors of each signal (TOML), in place of --noise.")
 @click.option(
@@ -63,19 +49,7 @@ _AT_LEAST_1 = click.IntRange(min=1)
     help="Shares of the cases for training, validation and test.",
 )
 @click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0), metavar="N")
-def dataset(
-    store: str,
-    selection: tuple[str, ...],
-    output: Path,
-    signals: tuple[str, ...],
-    rate: str | None,
-    samples: int,
-    draws: int,
-    levels: tuple[float, ...],
-    sensors: str | None,
-    shares: tuple[float, ...],
-    seed: int,
-) -> None:
+def dataset(store: str, selection: tuple[str, ...], output: Path, rate: str | None, **options: Any) -> None:
     """Write labelled windows of the cases of STORE, seen by sensors, as a data set for machine learning.
 
     DIR gets a Parquet file for each split, a card (croissant.json) and a README that explains all columns. No
@@ -84,20 +58,9 @@ def dataset(
     from postproc.datasets.dataset import write_dataset
     from rubhpc.running.progress import one_line
 
+    hertz = quantity(rate, "Hz", "--rate") if rate else None
     with one_line() as say:
-        made = write_dataset(
-            open_cases(store, selection),
-            output,
-            signals=signals,
-            rate=quantity(rate, "Hz", "--rate") if rate else None,
-            n_sample=samples,
-            n_draw=draws,
-            levels=levels,
-            sensors=sensors,
-            shares=shares,
-            seed=seed,
-            say=say,
-        )
+        made = write_dataset(open_cases(store, selection), output, rate=hertz, say=say, **options)
     for name, (n_case, n_window, n_contact) in made.files.items():
         click.echo(f"{name}: {n_window} windows of {n_case} cases, {n_contact} with contact")
     if made.n_left_out:

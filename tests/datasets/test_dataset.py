@@ -108,10 +108,7 @@ def test_noise_has_its_level_and_each_draw_is_another(store, tmp_path):
 
 def test_equal_arguments_give_equal_bytes_and_a_case_does_not_depend_on_others(store, tmp_path):
     sensors = tmp_path / "sensors.toml"
-    sensors.write_text(
-        '[vertical]\nwhite = "2 um"\nstep = "1 um"\n'
-        'run_out = [{ order = 1, amplitude = "4 um", phase = "40 deg" }]'
-    )
+    sensors.write_text('[vertical]\nwhite = "2 um"\nstep = "1 um"\nrun_out = [[1, "4 um", "40 deg"]]')
     for name, seed in (("a", 1), ("b", 1), ("c", 2)):
         write_dataset(store, tmp_path / name, sensors=sensors, seed=seed, **SMALL)
     assert digests(tmp_path / "a") == digests(tmp_path / "b")
@@ -243,18 +240,22 @@ def test_windows_of_run_ups_have_labels_of_their_own(tmp_path):
         ({"shares": (0.5, 0.2, 0.2)}, "split: 0.5 0.2 0.2: are not three shares with the sum 1"),
         ({"shares": (0.999, 0.001, 0)}, "split: a share of 0.001 of 57 cases leaves validation without one"),
         ({"rate": -1.0}, "rate: -1 Hz is out of range"),
-        ({"sensors": "[vertcal]"}, "vertcal]: no such signal of this data set; did you mean vertical?"),
+        ({"sensors": "[vertcal]"}, "vertcal: unknown key; did you mean vertical?"),
         ({"sensors": "[vertical]\nwhit = 1"}, "vertical] whit: unknown key; did you mean white?"),
         ({"sensors": '[vertical]\nwhite = "1 V"'}, 'vertical] white: "1 V"'),
         ({"sensors": "[vertical]\nwhite = -1"}, "vertical]: sensor: white: -1.0 is out of range; give 0 or"),
-        ({"sensors": "[vertical]\nrun_out = 3"}, "run_out: 3 is not a list of orders; write [{ order = 1"),
+        (
+            {"sensors": "[vertical]\nrun_out = 3"},
+            "run_out: 3 is no list of order, amplitude and phase; write [[",
+        ),
+        ({"sensors": "", "levels": (0.1,)}, "sensors: have noise of their own; remove --noise, or --sensors"),
         ({"sensors": "vertical = 3"}, "vertical]: 3 is not a table; write [vertical] and its keys"),
     ],
 )
 def test_what_cannot_be_is_refused(store, tmp_path, arguments, says):
     if "sensors" in arguments:
         (tmp_path / "s.toml").write_text(arguments["sensors"])
-        arguments = {"sensors": tmp_path / "s.toml"}
+        arguments = arguments | {"sensors": tmp_path / "s.toml"}
     with pytest.raises(InputError) as refused:
         write_dataset(store, tmp_path / "d", **(SMALL | arguments))
     assert says in str(refused.value)
