@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -34,13 +34,12 @@ OF_REVOLUTIONS = {
 }
 
 
-@dataclass(frozen=True, kw_only=True)
-class Column:
+class Column(NamedTuple):
     """A column of the table of windows: its type, SI unit and meaning."""
 
     name: str
     kind: str
-    unit: str = "1"
+    unit: str
     meaning: str
 
 
@@ -89,18 +88,15 @@ def case_columns(store: xr.Dataset) -> CaseColumns:
     parameters = {name: table[name].values for name in varied}
     columns, values = [], {}
     for name, column in table.items():
-        about = column.attrs
-        kind = TEXT if column.dtype == object else FLOAT
-        if kind == FLOAT and name in VARIABLES and VARIABLES[str(name)].dtype.startswith("int"):
-            kind = INT
-        meaning = about.get("long_name", str(name).replace("_", " "))
-        unit = about.get("units", "1") if kind != TEXT else ""
-        columns.append(Column(name=str(name), kind=kind, unit=unit, meaning=meaning))
+        of_schema = VARIABLES.get(str(name))
+        is_int = of_schema is not None and of_schema.dtype.startswith("int")
+        kind = TEXT if column.dtype == object else INT if is_int else FLOAT
+        unit = column.attrs.get("units", "1") if kind != TEXT else ""
+        columns.append(Column(str(name), kind, unit, column.attrs.get("long_name", str(name))))
         values[str(name)] = column.values
     codes = validity(store).transpose(*axes_of(store)).values.ravel()
     values["out_of_range"] = np.array([words(code) for code in codes.tolist()], dtype=object)
-    meaning = "limits of the model that the case leaves (empty: none)"
-    columns.append(Column(name="out_of_range", kind=TEXT, unit="", meaning=meaning))
+    columns.append(Column("out_of_range", TEXT, "", "limits of the model that the case leaves (empty: none)"))
     force = store["peak_contact_force"]
     peak = force.max([dim for dim in ("stator",) if dim in force.dims]).transpose(*axes_of(store))
     return CaseColumns(columns=columns, values=values, parameters=parameters, touches=peak.values.ravel() > 0)
@@ -109,31 +105,23 @@ def case_columns(store: xr.Dataset) -> CaseColumns:
 def window_columns(store: xr.Dataset, signals: dict[str, xr.DataArray], *, has_levels: bool) -> list[Column]:
     """Return the columns of a window before those of its case."""
     found = [
-        Column(name="case", kind=INT, meaning="number of the case in the selected grid, from 0"),
-        Column(name="draw", kind=INT, meaning="number of the draw of place and noise, from 0"),
-    ]
-    if has_levels:
-        meaning = "white noise, rms over the reference of each signal"
-        found.append(Column(name="noise", kind=FLOAT, meaning=meaning))
-    found += [
-        Column(name="start", kind=FLOAT, unit="s", meaning="first sample, from the beginning of the record"),
-        Column(name="rate", kind=FLOAT, unit="Hz", meaning="sampling rate"),
+        Column("case", INT, "1", "number of the case in the selected grid, from 0"),
+        Column("draw", INT, "1", "number of the draw of place and noise, from 0"),
+        *([Column("noise", FLOAT, "1", "rms of white noise over the reference of each signal")] * has_levels),
+        Column("start", FLOAT, "s", "first sample, from the beginning of the record"),
+        Column("rate", FLOAT, "Hz", "sampling rate"),
     ]
     for name, signal in signals.items():
-        meaning = str(signal.attrs.get("long_name", name))
-        found.append(Column(name=name, kind=WAVE, unit=str(signal.attrs.get("units", "1")), meaning=meaning))
+        unit, meaning = (str(signal.attrs.get(*about)) for about in (("units", "1"), ("long_name", name)))
+        found.append(Column(name, WAVE, unit, meaning))
     found += [
-        Column(name="key_phasor", kind=WAVE, unit="V", meaning="key-phasor, a pulse a revolution"),
-        Column(name="contact", kind=FLAG, unit="", meaning="whether any stator is touched within the window"),
-        Column(name="window_contact_fraction", kind=FLOAT, meaning="fraction of the window with a contact"),
+        Column("key_phasor", WAVE, "V", "key-phasor, a pulse a revolution"),
+        Column("contact", FLAG, "", "whether any stator is touched within the window"),
+        Column("window_contact_fraction", FLOAT, "1", "fraction of the window with a contact"),
     ]
     if is_run_up(store):
-        found.append(
-            Column(name="spin_speed", kind=FLOAT, unit="rad s-1", meaning="mean speed of the window")
-        )
-        found += [
-            Column(name=name, kind=FLOAT, unit=VARIABLES[name].unit, meaning=meaning)
-            for name, (stored, meaning) in OF_REVOLUTIONS.items()
-            if stored in store
-        ]
+        found.append(Column("spin_speed", FLOAT, "rad s-1", "mean speed of the window"))
+        for name, (stored, meaning) in OF_REVOLUTIONS.items():
+            if stored in store:
+                found.append(Column(name, FLOAT, VARIABLES[name].unit, meaning))
     return found

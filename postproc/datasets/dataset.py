@@ -20,6 +20,7 @@ from postproc.datasets.windows import Windows
 from postproc.signals.indicators import rms_about_mean
 from postproc.signals.sensors import Sensor, check_rate
 from postproc.signals.spectra import check_signal, samples_per_revolution
+from postproc.store.attributes import MEASURED
 from postproc.store.axes import axes_of, source
 from postproc.store.branch_points import is_of_points
 from postproc.store.case_table import import_parquet, metadata_of
@@ -90,8 +91,9 @@ def write_dataset(
     import_parquet(str(output))
     _check_output(output)
     check_shares(shares)
-    if is_of_points(store):
-        raise InputError(f"{source(store)}: branches have no waveforms; give the store of simulated cases")
+    if is_of_points(store) or MEASURED in store.attrs:
+        problem = "has no simulated waveforms, whose contacts are known"
+        raise InputError(f"{source(store)}: {problem}; give the store of a study of cases or run-ups")
     waves = _waves_of(store, signals)
     is_done = store["status"].values.ravel() == DONE
     require_results(np.where(is_done, 0.0, math.nan), store)
