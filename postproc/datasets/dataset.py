@@ -110,7 +110,7 @@ def write_dataset(
     windows = Windows(
         sensors=given or dict.fromkeys(waves, Sensor()),
         reference={} if given else _reference(store, waves, is_done, cases.touches),
-        levels=() if given else tuple(levels or LEVELS),
+        levels=() if given else tuple(dict.fromkeys(levels or LEVELS)),
         n_draw=n_draw,
         n_sample=n_sample,
         rate=_rate(store, n_sample, rate),
