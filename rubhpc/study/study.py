@@ -124,7 +124,7 @@ def read_axes(
         )
     axes = [(make_range if isinstance(v, dict) else make_axis)(name, v, rig, file) for name, v in pairs]
     try:
-        return draw(axes, sample)
+        return draw(axes, sample, rig)
     except InputError as error:
         raise InputError(f"{place(file)}: {error}") from None
 
@@ -368,7 +368,7 @@ class Study:
                 for axis in self.axes
                 if axis.name != DIRECTION and not (self.changes_speed and axis.name in SPEED_AXES)
             },
-            **({"sample": asdict(self.sample)} if self.sample else {}),
+            **({"sample": self.sample.as_dict()} if self.sample else {}),
             **({"branch": asdict(self.branch)} if self.branch else {}),
             **({"run_up": asdict(self.run_up)} if self.run_up else {}),
             **({"drive": asdict(self.drive)} if self.drive else {}),

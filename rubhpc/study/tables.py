@@ -21,6 +21,7 @@ PAPER_STEP = 0.5e-6  # s
 SAFE_SHARE = 0.9  # of the stability limit
 SEARCH_STEP = 1e-6  # s, of the modal scheme with the fixed normal
 SALTELLI, FEWEST_POINTS = "sobol", 8  # the design that Sobol' indices need
+_IN_SEQUENCE = ("sobol-sequence", "random")  # methods that draw one point after the other
 TURNING_STEP = 0.25e-6  # s, where it takes short steps of contact
 
 
@@ -208,6 +209,14 @@ class Sample:
         default=1,
         at_least=0,
     )
+    rub_share: float | None = quantity(
+        "",
+        doc="Share of cases whose contact-free motion would reach a stator; for sobol-sequence and random.",
+        example="0.5",
+        default=None,
+        above=0,
+        below=1,
+    )
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -219,6 +228,14 @@ class Sample:
             problem = f"{self.n} is not a power of two, without which Sobol' points lose their balance"
             fix = f'write {near // 2} or {near}, or set method = "sobol-sequence"'
             raise FieldError("n", f"{problem}; {fix}")
+
+        if self.rub_share is not None and self.method not in _IN_SEQUENCE:
+            fix = 'set method = "sobol-sequence" or "random"'
+            raise FieldError("rub_share", f"has no effect on the points of {self.method}; {fix}")
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the keys for JSON; `rub_share` only where it is given: older stores have none."""
+        return {key: value for key, value in asdict(self).items() if value is not None}
 
     @property
     def is_saltelli(self) -> bool:
