@@ -11,6 +11,7 @@ from rubhpc.integrate.marches.modal import ModalMarch
 from rubhpc.kernels.case_progress import LONG_AGO, follow, shaft_turn
 from rubhpc.kernels.collocation.march import LEAST_SCALE, advance_by_collocation
 from rubhpc.kernels.collocation.observing import Seen
+from rubhpc.kernels.collocation.tangent import Trail
 from rubhpc.kernels.collocation.structures import FORWARD, NORMAL, OPEN, CaseState, Solution, new_memory
 from rubhpc.kernels.sampling import Measured
 
@@ -44,6 +45,7 @@ class CollocationMarch(ModalMarch):
         super().__init__(setup, clearance, friction, initial, check)
         self._friction = friction
         self._seen: Seen | None = None
+        self.trail: Trail | None = None  # of tangent and events, where one is kept
         self._solution: Solution | None = None
         self._use_modes(setup)
         self._begin(initial.contact_force)
@@ -177,6 +179,8 @@ class CollocationMarch(ModalMarch):
             changed=zeros((s, 6)),
             guess=zeros((q, 2, s)),
             instant=zeros((q, 2)),
+            turned=np.full((3, q), np.inf),
+            looked=zeros(1, dtype=np.int64),
             touching=zeros(q, dtype=np.bool_),
             kept=zeros(q, dtype=np.bool_),
             bound=zeros(q, dtype=np.bool_),
@@ -224,4 +228,25 @@ class CollocationMarch(ModalMarch):
             self._case,
             self._solution,
             self._seen,
+            self.trail,
+        )
+
+    def new_trail(self, n_column: int, n_event: int) -> Trail:
+        """Room for a tangent of so many columns, and for events; the first columns are units of coordinates."""
+        modes, q = self._modes, self._clearance.size
+        n_x, s, n_row = self._case.x.size, modes.nodes.at.size, len(modes.local)
+        return Trail(
+            columns=np.eye(n_x, n_column),
+            event=np.zeros((n_event, 4), dtype=np.int64),
+            tick=np.zeros(n_event, dtype=np.int64),
+            approach=np.full(n_event + 1, np.nan),
+            count=np.zeros(2, dtype=np.int64),
+            least=np.full((2, q), np.inf),
+            before=np.zeros(n_x),
+            state=np.zeros(q, dtype=np.int64),
+            column=np.zeros(n_x),
+            after=np.zeros(n_x),
+            load=np.zeros(s * n_row),
+            rates=np.zeros((2, n_x)),
+            kick=np.zeros((2 * n_row, n_x)),
         )

@@ -58,6 +58,15 @@ from rubhpc.kernels.collocation.structures import (
     Tables,
 )
 from rubhpc.kernels.collocation.tables import end_of_step, fill_step, within_step
+from rubhpc.kernels.collocation.tangent import (
+    Trail,
+    carry_breakaway,
+    carry_event,
+    carry_freely,
+    carry_step,
+    note_event,
+    note_least,
+)
 from rubhpc.kernels.laws import LAGRANGE
 
 Floats = NDArray[np.float64]
@@ -249,6 +258,7 @@ def strike(
     memory.fastest = max(memory.fastest, approach)
     unseen = max(4.0 * clock.tick * acceleration, 4.0 * math.sqrt(2.0 * GAP_TOLERANCE * acceleration))
     least = max(accuracy * memory.fastest, unseen)
+    memory.least, memory.has_impulses = least, 1
     for i in range(state.size):
         solution.kept[i] = state[i] != OPEN and i != pair and bodies.normal_law[i] == LAGRANGE
         solution.touching[i] = solution.kept[i] or i == pair
@@ -355,11 +365,12 @@ def advance_by_collocation(
     case: CaseState,
     solution: Solution,
     seen: Seen,
+    trail: Trail | None,
 ) -> int:
     """Advance a case from the tick reached to `last_tick`.
 
-    `power` (levels, nm) are the exponentials of the modes over 2^level ticks. Returns an outcome of
-    `case_progress`.
+    `power` (levels, nm) are the exponentials of the modes over 2^level ticks; a trail keeps tangent and
+    events. Returns an outcome of `case_progress`.
     """
     s, x, state, after = nodes.at.size, case.x, case.state, solution.after
     n_x, top = x.size, tables.is_filled.size - 1
@@ -375,6 +386,19 @@ def advance_by_collocation(
     memory.is_new = 0
     while True:
         if todo == SETTLING:  # constants to begin with
+            if trail is not None and pair >= 0:
+                is_release = kind == NORMAL and trail.state[pair] != OPEN
+                is_carried = True
+                if kind == FRICTION and trail.state[pair] == STICKING:
+                    is_carried = carry_breakaway(bodies, s, x, state, pair, solution, trail)
+                elif not is_release:
+                    is_carried = carry_event(
+                        bodies, s, x, state, pair, kind, memory.least, memory.has_impulses == 1, solution, trail
+                    )
+                if not is_carried:
+                    return CONTACT_UNSOLVED
+                approach = np.nan if kind == FRICTION or is_release else trail.approach[trail.approach.size - 1]
+                note_event(pair, kind, trail.state[pair], state[pair], progress.tick, approach, trail)
             see_start(bodies, x, solution)
             if not find_forces(bodies, s, state, solution, solution.instant):
                 return CONTACT_UNSOLVED
@@ -397,6 +421,10 @@ def advance_by_collocation(
             progress.n_step += n_look
             if is_recorded:
                 record_flight(bodies, signals, power, clock, begun, tick, x, progress, seen)
+            if trail is not None:
+                for k in range(bodies.exponent.size):
+                    solution.turn[k] = np.exp(bodies.exponent[k] * ((tick - begun) * clock.tick))
+                carry_freely(bodies.n_complex, solution.turn, trail)
             progress.tick, kind = tick, NORMAL
             if pair < 0:
                 continue
@@ -430,6 +458,7 @@ def advance_by_collocation(
             if not tables.is_filled[slot]:
                 fill_step(bodies, nodes, tables, slot)
             step = tables.tick * 2.0 ** (tables.first_level + slot)
+            is_exact = trail is not None and todo == STEPPING
             n_iteration = take_step(
                 bodies,
                 nodes,
@@ -439,7 +468,7 @@ def advance_by_collocation(
                 state,
                 solution.guess,
                 NEWTON * accuracy * memory.scale,
-                False,
+                is_exact,
                 solution,
             )
             progress.n_step += 1
@@ -518,6 +547,19 @@ def advance_by_collocation(
                         solution,
                         seen,
                     )
+                if trail is not None:
+                    carry_step(
+                        bodies,
+                        nodes,
+                        tables,
+                        slot,
+                        taken / whole,
+                        state,
+                        solution.guess,
+                        solution,
+                        trail,
+                    )
+                    note_least(nodes, state, solution.guess, trail)
                 if taken == whole:
                     end_of_step(bodies, tables, slot, x, solution.load, after)
                 else:
@@ -546,6 +588,15 @@ def advance_by_collocation(
             memory.event_tick, memory.n_at_once = progress.tick, 0
         progress.n_event += 1
         is_still = kind == FRICTION
+        memory.has_impulses = 0
+        if trail is not None:
+            for k in range(n_x):
+                trail.before[k] = x[k]
+            for i in range(state.size):
+                trail.state[i] = state[i]
+            see_start(bodies, x, solution)
+            see_rates(bodies, s, pair, solution)
+            trail.approach[trail.approach.size - 1] = -solution.seen[pair * s, RATE]
         clear_impulses(solution.impulse)
         if not take_event(
             bodies,

@@ -129,6 +129,8 @@ class Solution(Struct):
     changed: Floats  # (s, 6), of what is seen of a pair
     guess: Floats  # (q, 2, s), forces
     instant: Floats  # (q, 2), forces
+    turned: Floats  # (3, q), smallest gap where it turns in flight; gap and rate at the last look
+    looked: Ints  # (1,), tick of that look
     touching: NDArray[np.bool_]  # (q,), pairs that an impact may press
     kept: NDArray[np.bool_]  # (q,), those of them that were closed before
     bound: NDArray[np.bool_]  # (q,), those of them that an impact does not open
@@ -162,6 +164,8 @@ class Memory(Protocol):
     n_at_once: int  # events at one tick
     event_tick: int  # of the last one
     is_new: int  # forces and states are to be found
+    least: float  # m/s, rate of approach below which the last impact had no restitution
+    has_impulses: int  # whether the last event had impulses
 
 
 _RECORD = np.dtype(
