@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rubhpc.integrate.marches.march import ALL_SAMPLES, NO_FORCES
 from rubhpc.integrate.marches.modal import ModalMarch
-from rubhpc.kernels.case_progress import LONG_AGO, follow, shaft_turn
-from rubhpc.kernels.collocation.march import LEAST_SCALE, advance_by_collocation
+from rubhpc.integrate.measuring.samples import no_record
+from rubhpc.kernels.case_progress import LONG_AGO, PAUSED, follow, restart_clock, shaft_turn
+from rubhpc.kernels.collocation.flight import LEAST_GAP
+from rubhpc.kernels.collocation.march import LEAST_SCALE, SETTLED, advance_by_collocation
 from rubhpc.kernels.collocation.observing import Seen
+from rubhpc.kernels.collocation.tangent import FULL as TOO_MANY
 from rubhpc.kernels.collocation.tangent import Trail
 from rubhpc.kernels.collocation.structures import FORWARD, NORMAL, OPEN, CaseState, Solution, new_memory
 from rubhpc.kernels.sampling import Measured
@@ -45,6 +49,7 @@ class CollocationMarch(ModalMarch):
         super().__init__(setup, clearance, friction, initial, check)
         self._friction = friction
         self._seen: Seen | None = None
+        self.accuracy = setup.accuracy
         self.trail: Trail | None = None  # of tangent and events, where one is kept
         self._solution: Solution | None = None
         self._use_modes(setup)
@@ -103,6 +108,42 @@ class CollocationMarch(ModalMarch):
         self._motion[:] = self.reduced(state)
         self._begin(state.contact_force)
         return True
+
+    def place_at(self, motion: Floats, states: NDArray[np.int64], tick: int) -> None:
+        """Stand at a tick with a motion (2 n,) and the pairs in their states (q,)."""
+        self._begin_time()
+        self._motion[:] = motion
+        restart_clock(self._bare_progress, tick, 0, is_recorded=False)
+        self._begin((states != OPEN).astype(float), shaft_turn(self.clock, tick))
+        self._case.state[:], self._memory["is_new"] = states, SETTLED
+
+    def carry(self, last_tick: int, columns: Floats, n_event: int) -> tuple[int, Trail]:
+        """Go on to a tick with the tangent columns (nx, k) and events; an outcome of the kernel, and the trail."""
+        trail = self.new_trail(columns, n_event)
+        self.trail, (samples, accumulator) = trail, self._idle
+        outcome = PAUSED
+        while outcome == PAUSED and not trail.count[TOO_MANY]:
+            outcome = self._kernel(last_tick, samples, accumulator, False)
+            if self.check is not None:
+                self.check()
+        self.trail = None
+        np.minimum(trail.least[0], self._solution.turned[LEAST_GAP], out=trail.least[0])
+        self._solution.turned[LEAST_GAP] = np.inf
+        return outcome, trail
+
+    @cached_property
+    def _idle(self) -> tuple[Samples, Accumulator]:
+        return no_record(self.n_place, self._clearance.size)
+
+    @property
+    def modes(self) -> FlightModes:
+        """Flight modes at the present speed."""
+        return self._modes
+
+    @property
+    def states(self) -> NDArray[np.int64]:
+        """State of each pair, (q,)."""
+        return self._case.state.copy()
 
     def take_over(
         self,
@@ -220,7 +261,7 @@ class CollocationMarch(ModalMarch):
             modes.signals,
             modes.power,
             self.clock,
-            self._setup.accuracy,
+            self.accuracy,
             last_tick,
             is_recorded,
             self._bare_progress,
@@ -231,12 +272,12 @@ class CollocationMarch(ModalMarch):
             self.trail,
         )
 
-    def new_trail(self, n_column: int, n_event: int) -> Trail:
-        """Room for a tangent of so many columns, and for events; the first columns are units of coordinates."""
+    def new_trail(self, columns: Floats, n_event: int) -> Trail:
+        """Tangent columns (nx, k), and room for events."""
         modes, q = self._modes, self._clearance.size
         n_x, s, n_row = self._case.x.size, modes.nodes.at.size, len(modes.local)
         return Trail(
-            columns=np.eye(n_x, n_column),
+            columns=np.array(columns, order="C"),
             event=np.zeros((n_event, 4), dtype=np.int64),
             tick=np.zeros(n_event, dtype=np.int64),
             approach=np.full(n_event + 1, np.nan),

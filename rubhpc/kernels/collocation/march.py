@@ -73,6 +73,7 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 Ints = NDArray[np.int64]
 
+KNOWN, NEW, SETTLED = range(3)  # of a case that begins: forces and states; neither; states alone
 STEPPING, TRYING, SETTLING = range(3)  # what is to be done next while a pair is closed
 ALLOWED = 3.0  # error of the forces of a step over the accuracy, before the record; in it the accuracy
 NEWTON = 0.03  # tolerance of the forces in Newton's method, over that of the steps
@@ -379,11 +380,11 @@ def advance_by_collocation(
     todo, pair, kind, acceleration = STEPPING, -1, NORMAL, 0.0
     tried, attempt, first_tried, is_still = STICKING, 0, STICKING, False
     trial = int(np.int64(-1))
-    if memory.is_new == 1 and any_closed(state):
+    if memory.is_new != KNOWN and any_closed(state):
         for i in range(state.size):
-            solution.waiting[i] = bodies.is_sticky and state[i] != OPEN
+            solution.waiting[i] = memory.is_new == NEW and bodies.is_sticky and state[i] != OPEN
         todo = TRYING
-    memory.is_new = 0
+    memory.is_new = KNOWN
     while True:
         if todo == SETTLING:  # constants to begin with
             if trail is not None and pair >= 0:

@@ -163,7 +163,7 @@ class Memory(Protocol):
     unseen: int  # ticks of a flight that are taken without looking for a touch
     n_at_once: int  # events at one tick
     event_tick: int  # of the last one
-    is_new: int  # forces and states are to be found
+    is_new: int  # what is to be found as a case begins: `march.KNOWN`
     least: float  # m/s, rate of approach below which the last impact had no restitution
     has_impulses: int  # whether the last event had impulses
 
