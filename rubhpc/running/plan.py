@@ -40,7 +40,6 @@ _SECONDS, _LEAST = 12.0, 4.0  # wall time of all, and of timing at least
 _OFF = 2.0  # factor by which the number of cases of a refined map is off, at most, as a rule (0.5 to 1.9)
 _FOR_HALF, _MANY, _LONG = 3.0, 4, 600.0  # s of it to time half of so many stators, if all takes so many s
 _AGREED = 1.06  # most over least time, up to which no range is given
-_FEW = 3  # batches, which may all miss the main cost
 _MAIN = 0.4  # share of the time from which a part of it is named
 _FILE, _BYTE = 5e-4, 3e-9  # processor seconds to write a file, and a byte in it, about
 _LEDGERS = 2  # copies of the measures of all cases while they are packed, about
@@ -133,9 +132,7 @@ class Plan:
             known = f" at {' to '.join(dict.fromkeys(shares))} of it" if max(cut) > 0.0 else ""
             texts.append(f"{len(cut)} cut for time{memory}{known}, the rest extrapolated")
         if self._range and n < self.counts[MISSING]:
-            is_few = len(self.sample.batches) <= _FEW
-            share = "two plans in three" if is_few else "eight to nine plans in ten"
-            texts.append(f"they {'are few and ' * is_few}differ: such a range contains the time in {share}")
+            texts.append("they differ: such a range contains the time in eight to nine plans in ten")
         return ["; ".join(texts)]
 
     @property

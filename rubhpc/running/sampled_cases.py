@@ -207,6 +207,10 @@ class CaseTimer:
             is_known = n >= least and spent > _ENOUGH and high < _AGREED * low
             if is_known or n + len(sample.failures) >= _MOST_CASES or (n and self.left <= 0.0):
                 break
+            if memory() > 0.5 * MOST_MEMORY:
+                self._free()
+                if n and memory() > 0.9 * MOST_MEMORY:
+                    break
             say(f"timing cases: {n} so far")
             try:
                 with self._guarded():
@@ -227,6 +231,10 @@ class CaseTimer:
         found.sort(key=lambda at: self._grid.setup_values(at) != own)
         return [index, *found[: _TOGETHER - 1]]
 
+    def _free(self) -> None:
+        self._setups = KeptSetups(self._study)
+        gc.collect()
+
     def time_half(self, seconds: float) -> float:
         """Time of the latest case that was cut, with every second stator over that with all; NaN if unknown.
 
@@ -234,8 +242,8 @@ class CaseTimer:
         """
         if self._latest is None or any(probe.stator for probe in self._study.recording.probe):
             return math.nan
-        (case, whole), self._setups = self._latest, KeptSetups(self._study)
-        gc.collect()
+        case, whole = self._latest
+        self._free()
         self._end = time.monotonic() + seconds - seconds_compiling()
         fewer = replace(case, rig=replace(case.rig, stator=case.rig.stator[::2]))
         with suppress(Enough, Exception), self._guarded():
@@ -250,7 +258,7 @@ class CaseTimer:
 
         def look(_: int, frame: FrameType | None) -> None:
             # Python drops what is raised within a callback for what is freed: the next look raises it.
-            if frame is None or frame.f_globals.get("__name__") != "weakref":
+            if frame is None or "weakref" not in frame.f_globals.get("__name__", ""):
                 self._look()
 
         if threading.current_thread() is not threading.main_thread():
@@ -276,12 +284,7 @@ class CaseTimer:
     def _time_batch(self, indices: list[Index], steps: float, untimed: NDArray[np.bool_]) -> None:
         """Time related cases one after the other, few if they take long, and strike them off."""
         sample = self.sample
-        if memory() > 0.5 * MOST_MEMORY:
-            self._setups = KeptSetups(self._study)
-            gc.collect()
         before = self._peak = memory()
-        if before > 0.9 * MOST_MEMORY and sample.batches:
-            raise Enough
         index, cases = indices[0], list[Timed]()
         known = set[tuple[tuple[float, ...], float]]()  # set-ups and frictions
         try:

@@ -226,7 +226,7 @@ def test_plan_says_what_was_cut_and_what_takes_most(tmp_path, monkeypatch):
     monkeypatch.setattr(CaseTimer, "time_cases", lambda *_: Sample(batches=batches, cut=[0.1, 0.2]))
     text = make_plan(read_study(write_study(tmp_path, transient=90))).text()
     assert (
-        "timed       2 cases; 2 cut for time at 10 % to 20 % of it, the rest extrapolated; they are few"
+        "timed       2 cases; 2 cut for time at 10 % to 20 % of it, the rest extrapolated; they differ"
         in text
     )
     assert "mostly      the transient, 90 revolutions (98 % of the time)" in text
