@@ -14,9 +14,9 @@ from rubhpc.kernels.case_progress import LONG_AGO, PAUSED, follow, restart_clock
 from rubhpc.kernels.collocation.flight import LEAST_GAP
 from rubhpc.kernels.collocation.march import LEAST_SCALE, SETTLED, advance_by_collocation
 from rubhpc.kernels.collocation.observing import Seen
+from rubhpc.kernels.collocation.structures import FORWARD, NORMAL, OPEN, CaseState, Solution, new_memory
 from rubhpc.kernels.collocation.tangent import FULL as TOO_MANY
 from rubhpc.kernels.collocation.tangent import Trail
-from rubhpc.kernels.collocation.structures import FORWARD, NORMAL, OPEN, CaseState, Solution, new_memory
 from rubhpc.kernels.sampling import Measured
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.marches.modal import Place
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.record import State
+    from rubhpc.integrate.reduced_model.flight_modes import FlightModes
     from rubhpc.kernels.accumulators import Accumulator, Samples
     from rubhpc.kernels.case_progress import Clock, Progress
     from rubhpc.kernels.sampling import Recorder
@@ -117,8 +118,11 @@ class CollocationMarch(ModalMarch):
         self._begin((states != OPEN).astype(float), shaft_turn(self.clock, tick))
         self._case.state[:], self._memory["is_new"] = states, SETTLED
 
-    def carry(self, last_tick: int, columns: Floats, n_event: int) -> tuple[int, Trail]:
+    def carry(
+        self, last_tick: int, columns: Floats, n_event: int, accuracy: float | None = None
+    ) -> tuple[int, Trail]:
         """Go on to a tick with the tangent columns (nx, k) and events; an outcome of the kernel, and the trail."""
+        own, self.accuracy = self.accuracy, accuracy or self.accuracy
         trail = self.new_trail(columns, n_event)
         self.trail, (samples, accumulator) = trail, self._idle
         outcome = PAUSED
@@ -126,10 +130,37 @@ class CollocationMarch(ModalMarch):
             outcome = self._kernel(last_tick, samples, accumulator, False)
             if self.check is not None:
                 self.check()
-        self.trail = None
+        self.trail, self.accuracy = None, own
         np.minimum(trail.least[0], self._solution.turned[LEAST_GAP], out=trail.least[0])
         self._solution.turned[LEAST_GAP] = np.inf
         return outcome, trail
+
+    def keep(self, trail: object) -> None:
+        """Nothing: events are kept where a tangent is carried."""
+
+    def pass_sections(
+        self, n_revolution: int, samples: Samples, accumulator: Accumulator
+    ) -> tuple[Floats, str | None]:
+        """Go on by some revolutions without a record.
+
+        Returns
+        -------
+        (n_revolution, 2 n)
+            The motion at the end of each.
+        str or None
+            Why the case cannot go on.
+        """
+        sections, per_revolution = (
+            np.empty((n_revolution, self._motion.size)),
+            self.clock.samples_per_revolution,
+        )
+        for i in range(n_revolution):
+            first = (i - n_revolution) * per_revolution
+            reason = self.advance(first, first + per_revolution, samples, accumulator, is_recorded=False)
+            if reason is not None:
+                return sections, reason
+            sections[i] = self.motion()
+        return sections, None
 
     @cached_property
     def _idle(self) -> tuple[Samples, Accumulator]:

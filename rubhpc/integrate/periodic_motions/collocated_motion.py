@@ -28,16 +28,17 @@ if TYPE_CHECKING:
 
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.record import State
+    from rubhpc.integrate.setup import Setup
     from rubhpc.kernels.collocation.tangent import Trail
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-ACCURACY = 1e-5  # of forces, at most: periodic motions close to about a tenth of it
+ACCURACY = 1e-4  # of forces, at most: periodic motions close to about a hundredth of it
 STATE_BITS = 2  # of a pair in the number of all states
 
 
-def followed_motion(setup: ModalSetup) -> type[PiecewiseMotion | CollocatedMotion]:
+def followed_motion(setup: Setup) -> type[PiecewiseMotion | CollocatedMotion]:
     """Return what follows the motions of a set-up: in closed form, or by collocation."""
     return CollocatedMotion if setup.scheme is Scheme.COLLOCATION else PiecewiseMotion
 
@@ -60,7 +61,7 @@ class CollocatedRevolution:
     Attributes
     ----------
     derivative : (2 n, 2 n)
-        Of its end by its beginning.
+        Of its end by its beginning; (2 n, 0) where it was not asked for.
     """
 
     end: Floats
@@ -104,7 +105,7 @@ class CollocatedMotion:
         self.n, self.q = self.bodies.stiffness.shape[0], len(setup.model.stators)
         self.energy = np.ones(2 * self.n)
         self.energy[: self.n] = setup.spin**2
-        march.accuracy = min(setup.accuracy, ACCURACY)
+        self._accuracy = min(setup.accuracy, ACCURACY)
         self.start, self.states = march.motion(), code_of(march.states)
 
     @cached_property
@@ -131,6 +132,7 @@ class CollocatedMotion:
         *,
         phase: float = 0.0,
         share: float = 1.0,
+        has_derivative: bool = True,
     ) -> list[CollocatedRevolution]:
         """Follow a motion through several revolutions, or shares of them, from a phase on.
 
@@ -145,12 +147,7 @@ class CollocatedMotion:
         march.place_at(motion, states_of(states, self.q), begin)
         for _ in range(n_revolution):
             end = begin + round(share * per_revolution)
-            outcome, trail = march.carry(end, self._columns, most_events)
-            if outcome == DIVERGED:
-                raise Unfollowed(f"a displacement passes {self.setup.displacement_limit:.3g} m")
-            if outcome != FINISHED or trail.count[FULL]:
-                many = f"more than {most_events} events in a revolution"
-                raise Unfollowed(many if trail.count[FULL] else "no contact forces that obey the laws were found")
+            trail = self._carry(end, np.eye(2 * self.n, 2 * self.n if has_derivative else 0), most_events)
             found.append(
                 CollocatedRevolution(
                     end=march.motion(),
@@ -200,10 +197,23 @@ class CollocatedMotion:
             columns = revolution.derivative @ columns
         return columns
 
-    def carried(self, revolution: CollocatedRevolution, columns: Floats) -> Floats:
-        """What becomes of small changes (2 n, k) of the beginning of a revolution."""
-        moved: Floats = revolution.derivative @ columns
-        return moved
+    def revolve_with(self, motion: Floats, states: int, columns: Floats) -> tuple[Floats, int, Floats]:
+        """Motion and states after a revolution, and what small changes (2 n, k) of the beginning become."""
+        march = self.march
+        march.place_at(motion, states_of(states, self.q), 0)
+        trail = self._carry(march.clock.samples_per_revolution << march.clock.sample_level, columns, MOST_EVENTS)
+        return march.motion(), code_of(march.states), march.modes.motion @ trail.columns
+
+    def _carry(self, tick: int, columns: Floats, most_events: int) -> Trail:
+        """Go on to a tick with small changes (2 n, k) of the motion."""
+        outcome, trail = self.march.carry(tick, self._columns @ columns, most_events, self._accuracy)
+        if outcome == DIVERGED:
+            raise Unfollowed(f"a displacement passes {self.setup.displacement_limit:.3g} m")
+        if trail.count[FULL]:
+            raise Unfollowed(f"more than {most_events} events in a revolution")
+        if outcome != FINISHED:
+            raise Unfollowed("no contact forces that obey the laws were found")
+        return trail
 
     def contact_force(self, states: int, motion: Floats) -> Floats:
         """Force of each pair (q,), N, at the angle 0; of a closed one at least the smallest number."""

@@ -50,9 +50,9 @@ from rubhpc.kernels.shooting import (
 )
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from collections.abc import Sequence
+
+    from numpy.typing import NDArray
 
     from rubhpc.integrate.periodic_motions.collocated_motion import CollocatedRevolution
     from rubhpc.integrate.periodic_motions.revolution import Revolution
@@ -154,7 +154,9 @@ def shoot(
     """
     if isinstance(piecewise, CollocatedMotion):
         given = motion, states, period
-        return _shoot_by_revolutions(piecewise, *given, most_iterations, least_step, most_events, most_residual)
+        return _shoot_by_revolutions(
+            piecewise, *given, most_iterations, least_step, most_events, most_residual
+        )
     longest = piecewise.longest if watches_turns else piecewise.highest
     search = new_search(motion.size, most_iterations, least_step, most_residual)
     shot = _Shot(piecewise, motion, states, period, piecewise.timing(longest, most_events), search)
@@ -198,12 +200,13 @@ def _shoot_by_revolutions(
         usual = abs(followed.setup.spin * followed.bodies.clearance)
         grazing = _grazing(search.revolutions, usual)
         raise NotConverged(f"{problem} at a residual of {search.residual:.2g}{grazing}")
+    search.finish()
     revolutions = search.revolutions[: search.shortest()]
     return Orbit(
         motion=search.motion,
         states=search.states,
         revolutions=tuple(revolutions),
-        monodromy=followed.monodromy(revolutions),
+        monodromy=search.monodromy(len(revolutions)),
         residual=search.residual,
         iterations=search.iterations,
     )

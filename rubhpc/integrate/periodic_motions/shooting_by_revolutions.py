@@ -17,11 +17,15 @@ if TYPE_CHECKING:
 
 CONVERGED = 1e-9  # residual over the size of the motion: sought
 CLOSED = 1e-5  # the same: enough where no step is better, since the steps of the integrator change
+FAST = 0.05  # ratio of two residuals up to which a derivative serves once more
+NEAR = 1e-5  # of the motion's size: its derivative serves for the multipliers
 SAME = 1e-4  # of the motion's size: sections that close are no farther apart
 
 
 class Search:
     """A search under way, from a beginning.
+
+    The derivative is that of an earlier motion as long as steps by it make the residual much smaller.
 
     Attributes
     ----------
@@ -40,22 +44,35 @@ class Search:
         """Follow the beginning; `Unfollowed` where it cannot be."""
         self._case, self._period, self._most_events = followed, period, most_events
         self.motion, self.states, self.iterations = motion, states, 0
-        self.revolutions = self._follow(motion, states)
+        self.revolutions = self._follow(motion, states, has_derivative=False)
         self.residual = self._residual(motion, self.revolutions)
+        self._matrix: Floats | None = None  # derivative of the residual
+        self._differs = np.inf  # how far from the present motion that derivative was found, over its size
 
     def run(self, most_iterations: int, least_step: float) -> str:
         """Take Newton steps, or shares of them; returns why the motion does not close, or ""."""
-        size = self.motion.size
         while self.residual > CONVERGED:
             if self.iterations == most_iterations:
                 return "" if self.residual <= CLOSED else f"no convergence within {most_iterations} iterations"
             self.iterations += 1
-            defect = self.revolutions[-1].end - self.motion
-            matrix = np.eye(size) - self._case.monodromy(self.revolutions)
-            step = np.linalg.lstsq(matrix, defect, rcond=1e-12)[0]
-            if not self._improve(step, least_step):
+            if self._matrix is None:
+                self._find_derivative()
+            before, defect = self.residual, self.revolutions[-1].end - self.motion
+            step = np.linalg.lstsq(self._matrix, defect, rcond=1e-12)[0]
+            is_better = self._improve(step, least_step)
+            if not is_better and self._differs == 0.0:
                 return "" if self.residual <= CLOSED else "Newton's method stalls"
+            self._differs += self._case.size(step) / self._case.size(self.motion)
+            if not is_better or self.residual > FAST * before:
+                if self.residual <= CLOSED:
+                    break
+                self._matrix = None
         return ""
+
+    def finish(self) -> None:
+        """Have the derivatives of the revolutions, of a motion as near as multipliers need."""
+        if self._matrix is None or self._differs > NEAR:
+            self._find_derivative()
 
     def shortest(self) -> int:
         """Revolutions after which the motion closes: a divisor of the period."""
@@ -65,12 +82,24 @@ class Search:
                 return d
         return self._period
 
+    def _find_derivative(self) -> None:
+        self.revolutions = self._follow(self.motion, self.states, has_derivative=True)
+        self._derivatives = [revolution.derivative for revolution in self.revolutions]
+        self._matrix, self._differs = np.eye(self.motion.size) - self.monodromy(self._period), 0.0
+
+    def monodromy(self, period: int) -> Floats:
+        """Derivative (2 n, 2 n) of the motion after a period by the beginning."""
+        columns = np.eye(self.motion.size)
+        for derivative in self._derivatives[:period]:
+            columns = derivative @ columns
+        return columns
+
     def _improve(self, step: Floats, least_step: float) -> bool:
         share = 1.0
         while share >= least_step:
             motion = self.motion + share * step
             try:
-                revolutions = self._follow(motion, self.revolutions[-1].states)
+                revolutions = self._follow(motion, self.revolutions[-1].states, has_derivative=False)
             except Unfollowed:
                 share *= 0.5
                 continue
@@ -82,8 +111,10 @@ class Search:
             share *= 0.5
         return False
 
-    def _follow(self, motion: Floats, states: int) -> list[CollocatedRevolution]:
-        return self._case.follow(motion, states, self._period, self._most_events)
+    def _follow(self, motion: Floats, states: int, *, has_derivative: bool) -> list[CollocatedRevolution]:
+        return self._case.follow(
+            motion, states, self._period, self._most_events, has_derivative=has_derivative
+        )
 
     def _residual(self, motion: Floats, revolutions: list[CollocatedRevolution]) -> float:
         return self._case.size(revolutions[-1].end - motion) / max(self._case.size(motion), np.finfo(float).tiny)

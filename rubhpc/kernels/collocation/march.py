@@ -394,11 +394,22 @@ def advance_by_collocation(
                     is_carried = carry_breakaway(bodies, s, x, state, pair, solution, trail)
                 elif not is_release:
                     is_carried = carry_event(
-                        bodies, s, x, state, pair, kind, memory.least, memory.has_impulses == 1, solution, trail
+                        bodies,
+                        s,
+                        x,
+                        state,
+                        pair,
+                        kind,
+                        memory.least,
+                        memory.has_impulses == 1,
+                        solution,
+                        trail,
                     )
                 if not is_carried:
                     return CONTACT_UNSOLVED
-                approach = np.nan if kind == FRICTION or is_release else trail.approach[trail.approach.size - 1]
+                approach = (
+                    np.nan if kind == FRICTION or is_release else trail.approach[trail.approach.size - 1]
+                )
                 note_event(pair, kind, trail.state[pair], state[pair], progress.tick, approach, trail)
             see_start(bodies, x, solution)
             if not find_forces(bodies, s, state, solution, solution.instant):

@@ -325,7 +325,7 @@ def fill_bend_slope(bodies: Bodies, i: int, row: int, v: int, at: int, solution:
             across += tangent[a] * y[v + a]
         if a > TWIST:
             squares += y[v + a] * y[v + a]
-    n_along, n_across = solution.unit[row, 0], solution.unit[row, 1]
+    n_across = solution.unit[row, 1]
     for a in range(n_local):
         if a == TWIST:
             continue

@@ -40,7 +40,7 @@ from rubhpc.kernels.collocation.structures import (
     Solution,
     Tables,
 )
-from rubhpc.kernels.collocation.tables import end_of_step, turn_freely, within_step
+from rubhpc.kernels.collocation.tables import end_of_step, within_step
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -58,7 +58,9 @@ class Trail(Struct):
     columns: Floats  # (nx, c), changes of the coordinates
     event: Ints  # (k, 4), pair, kind (NORMAL or FRICTION), its state before and after
     tick: Ints  # (k,)
-    approach: Floats  # (k + 1,), rate at which the gap of a pair closes, m/s; NaN of other events; last: work space
+    approach: (
+        Floats  # (k + 1,), rate at which the gap of a pair closes, m/s; NaN of other events; last: work space
+    )
     count: Ints  # (2,), number of events, and 1 where there was no room for another
     least: Floats  # (2, q), smallest gap, m, and force, N, where they turn between events
     before: Floats  # (nx,), coordinates before an event
@@ -67,7 +69,9 @@ class Trail(Struct):
     after: Floats  # (nx,)
     load: Floats  # (s R,)
     rates: Floats  # (2, nx), of the coordinates before and after an event
-    kick: Floats  # (2 R, nx), change of the coordinates by impulses that change with a local motion or velocity
+    kick: (
+        Floats  # (2 R, nx), change of the coordinates by impulses that change with a local motion or velocity
+    )
 
 
 @linked_sum
@@ -96,7 +100,7 @@ def carry_step(
 ) -> None:
     """Carry the columns through a part of a step whose matrix is that at its solution."""
     s, n_local, n_row = nodes.at.size, bodies.n_local, bodies.load.shape[0]
-    n_closed, n_pushed, n = list_closed(bodies, nodes, state, solution)
+    n_closed, _, n = list_closed(bodies, nodes, state, solution)
     step, n_x = tables.tick * 2.0 ** (tables.first_level + slot), trail.column.size
     change, moved, begun, pushed = solution.change, solution.moved, solution.begun, solution.pushed
     column, load, target = trail.column, trail.load, solution.residual
@@ -107,7 +111,7 @@ def carry_step(
     for c in range(trail.columns.shape[1]):
         for k in range(n_x):
             column[k] = trail.columns[k, c]
-        for r in range(begun.size):
+        for r in range(2 * n_row):
             total = 0.0
             for k in range(n_x):
                 total += local[r, k] * column[k]
@@ -175,9 +179,7 @@ def carry_step(
 
 
 @linked_sum
-def rates_of(
-    bodies: Bodies, s: int, x: Floats, state: Ints, solution: Solution, rates: Floats
-) -> bool:
+def rates_of(bodies: Bodies, s: int, x: Floats, state: Ints, solution: Solution, rates: Floats) -> bool:
     """Fill the rates of the coordinates at an instant, with the forces that keep contacts closed."""
     n = bodies.n_complex
     see_start(bodies, x, solution)
@@ -297,9 +299,7 @@ def carry_breakaway(
 
 
 @linked_sum
-def margin_change(
-    bodies: Bodies, s: int, pair: int, size: float, solution: Solution, trail: Trail
-) -> float:
+def margin_change(bodies: Bodies, s: int, pair: int, size: float, solution: Solution, trail: Trail) -> float:
     """Change of the friction that a sticking pair has left, for a unit of `trail.column`, by differences."""
     change = 0.0
     for sense in (-1.0, 1.0):
@@ -357,7 +357,9 @@ def note_least(nodes: Nodes, state: Ints, force: Floats, trail: Trail) -> None:
 
 
 @linked_sum
-def note_event(pair: int, kind: int, before: int, after: int, tick: int, approach: float, trail: Trail) -> None:
+def note_event(
+    pair: int, kind: int, before: int, after: int, tick: int, approach: float, trail: Trail
+) -> None:
     """Note an event, unless there is no room."""
     k = trail.count[N_EVENT]
     if k == trail.tick.size:
