@@ -250,6 +250,7 @@ class CollocationMarch(ModalMarch):
             pushed=zeros((q, 2, s)),
             changed=zeros((s, 6)),
             guess=zeros((q, 2, s)),
+            weight=zeros(s),
             instant=zeros((q, 2)),
             turned=np.full((3, q), np.inf),
             looked=zeros(1, dtype=np.int64),

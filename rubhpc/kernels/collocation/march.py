@@ -89,7 +89,9 @@ PARTED = 1e-9  # of the rim's speed: gap rate above which a pair has parted in a
 
 
 @linked_sum
-def continue_forces(nodes: Nodes, part: float, ratio: float, force: Floats, guess: Floats) -> None:
+def continue_forces(
+    nodes: Nodes, part: float, ratio: float, state: Ints, force: Floats, weight: Floats, guess: Floats
+) -> None:
     """Forces of the last step continued over one that begins after `part` of it and is `ratio` times as long.
 
     By their Legendre series, of one order less where the step is much longer.
@@ -98,17 +100,21 @@ def continue_forces(nodes: Nodes, part: float, ratio: float, force: Floats, gues
     most = s if ratio < 1.5 else s - 1
     for j in range(s):
         x = 2.0 * (part + nodes.at[j] * ratio) - 1.0
+        for k in range(s):
+            weight[k] = 0.0
+        before, now = 1.0, x
+        for m in range(most):
+            for k in range(s):
+                weight[k] += before * nodes.legendre[m, k]
+            later = ((2 * m + 3) * x * now - (m + 1) * before) / (m + 2)
+            before, now = now, later
         for i in range(force.shape[0]):
-            for f in range(2):
-                before, now, total = 1.0, x, 0.0
-                for m in range(most):
-                    coefficient = 0.0
+            if state[i] != OPEN:
+                for f in range(2):
+                    total = 0.0
                     for k in range(s):
-                        coefficient += nodes.legendre[m, k] * force[i, f, k]
-                    total += coefficient * before
-                    later = ((2 * m + 3) * x * now - (m + 1) * before) / (m + 2)
-                    before, now = now, later
-                guess[i, f, j] = total
+                        total += weight[k] * force[i, f, k]
+                    guess[i, f, j] = total
 
 
 @linked_sum
@@ -464,13 +470,14 @@ def advance_by_collocation(
                     slot -= 1
                 if memory.length > 0:
                     ratio = (1 << (tables.first_level + slot)) / memory.length
-                    continue_forces(nodes, memory.part, ratio, case.force, solution.guess)
+                    continue_forces(nodes, memory.part, ratio, state, case.force, solution.weight, solution.guess)
                 else:
                     solution.guess[:] = case.force
             if not tables.is_filled[slot]:
                 fill_step(bodies, nodes, tables, slot)
             step = tables.tick * 2.0 ** (tables.first_level + slot)
             is_exact = trail is not None and todo == STEPPING
+            is_whole = is_recorded or bodies.is_sticky or is_exact
             n_iteration = take_step(
                 bodies,
                 nodes,
@@ -480,6 +487,7 @@ def advance_by_collocation(
                 state,
                 solution.guess,
                 NEWTON * accuracy * memory.scale,
+                is_whole,
                 is_exact,
                 solution,
             )

@@ -128,6 +128,7 @@ class Solution(Struct):
     pushed: Floats  # (q, 2, s), of the forces
     changed: Floats  # (s, 6), of what is seen of a pair
     guess: Floats  # (q, 2, s), forces
+    weight: Floats  # (s,)
     instant: Floats  # (q, 2), forces
     turned: Floats  # (3, q), smallest gap where it turns in flight; gap and rate at the last look
     looked: Ints  # (1,), tick of that look
