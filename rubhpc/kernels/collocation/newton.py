@@ -59,7 +59,7 @@ SLOW = 0.2  # of the last change: with less progress the matrix is made anew
 
 @linked_sum
 def factorise(a: Floats, pivot: Ints, n: int) -> bool:
-    """Factors of a matrix in its place; False where it is singular."""
+    """Factors of a matrix in its place, with the inverse pivots; False where it is singular."""
     for k in range(n):
         best, largest = k, abs(a[k, k])
         for i in range(k + 1, n):
@@ -74,6 +74,7 @@ def factorise(a: Floats, pivot: Ints, n: int) -> bool:
                 a[k, j] = a[best, j]
                 a[best, j] = held
         inverse, source = 1.0 / a[k, k], a[k]
+        a[k, k] = inverse
         for i in range(k + 1, n):
             target = a[i]
             factor = target[k] * inverse
@@ -102,7 +103,7 @@ def solve_factorised(a: Floats, pivot: Ints, n: int, b: Floats) -> None:
         total = b[k]
         for j in range(k + 1, n):
             total -= a[k, j] * b[j]
-        b[k] = total / a[k, k]
+        b[k] = total * a[k, k]
 
 
 @linked_sum
