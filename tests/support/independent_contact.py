@@ -4,7 +4,7 @@ Matrices come from `reference_bodies`. In a step contact forces are constant and
 its middle; the motion under them is the exponential of the whole system. Gap, slip and law are met by
 
     hard     gap rate = (gap at the touch - gap) / fade at the end, and N >= 0
-    springs  N = f(mean of the gaps at both ends, mean gap rate)
+    springs  N = f(gap, gap rate), both the means of the ends
     stick    slip = 0 at the end, |T| <= mu_s N
     slide    T = +-mu(mean slip) N
 
@@ -71,7 +71,7 @@ def first_lateral_frequency(rig):
     return math.sqrt(scipy.linalg.eigvalsh(bodies.stiffness[:n, :n], bodies.mass[:n, :n])[0])
 
 
-def pair_rows(bodies, radius, angle, sense):
+def pair_rows(bodies, radius, angle):
     """Motions of each pair over all degrees, (q, m, n).
 
     Of the tip relative to the disc's centre along the stator and across; the rim's turn; then amplitudes
@@ -95,17 +95,15 @@ def pair_rows(bodies, radius, angle, sense):
     return rows
 
 
-def march_bodies(
-    bodies, spin, case, radius, angle, clearance, longest_step, displacement=None, velocity=None
-):
-    """March from rest, or from displacement and velocity (n,), and measure."""
+def march_bodies(bodies, spin, case, radius, angle, clearance, longest_step, start=None):
+    """March from equilibrium, or from `start` (2, n) of displacements and velocities, and measure."""
     n, q = len(bodies.mass), len(radius)
     revolutions, per_revolution = case["revolutions"], case.get("samples_per_revolution", 64)
     n_sample = revolutions * per_revolution
     interval = 2 * math.pi / abs(spin) / per_revolution
-    coarsest = max(2, math.ceil(math.log2(interval / longest_step)))  # halvings of an interval to a step
-    top, h_level = coarsest + FINEST, FINEST
-    tick = interval / 2**top
+    halved = max(2, math.ceil(math.log2(interval / longest_step)))  # intervals, to steps of contact
+    lengths = interval / 2.0 ** np.arange(halved + FINEST, -1, -1)
+    laws, table = read_laws(case, fade=lengths[FINEST] / 2)
 
     inverse = np.linalg.inv(bodies.mass)
     system = np.zeros((2 * n, 2 * n))
@@ -117,101 +115,106 @@ def march_bodies(
     turning = bodies.stiffness - spin**2 * bodies.mass + 1j * spin * bodies.damping
     whirl = np.linalg.solve(turning, bodies.unbalance[0] - 1j * bodies.unbalance[1])
     whirl = np.concatenate([whirl, 1j * spin * whirl])
-    sag = np.linalg.solve(bodies.stiffness, bodies.weight)
-    first = np.concatenate([np.zeros(n) if displacement is None else displacement - sag, np.zeros(n)])
-    if velocity is not None:
-        first[n:] = velocity
-    z = enter @ (first - whirl.real)
-
-    rows = pair_rows(bodies, radius, angle, np.sign(spin))
+    rows = pair_rows(bodies, radius, angle)
     m = rows.shape[1]
+    sag, still = at_rest(bodies, rows, radius, clearance, laws)
+    first = np.array([still, np.zeros(n)]) if start is None else np.array(start)
+    first[0] -= sag
+    z = enter @ (first.ravel() - whirl.real)
+
     rows = rows.reshape(q * m, n)
     load = enter[:, n:] @ inverse @ rows.T  # rates of the modes from loads on the motions of pairs
-    moves = (np.abs(load).max(axis=1) > 1e-13 * np.abs(load).max()) | (np.abs(z) > 1e-13 * np.abs(z).max())
+    size = np.abs(load).max(axis=1)
+    moves = (size > 1e-13 * size.max()) | (np.abs(z) > 1e-13 * np.abs(z).max())
     kept = (exponent.imag >= 0) & moves  # the others are their conjugates, or never move
-    share = np.where(exponent.imag[kept] > 0, 2.0, 1.0)
     exponent, z, load = exponent[kept], z[kept], load[kept]
-    shape = shape[:, kept] * share
+    shape = shape[:, kept] * np.where(exponent.imag > 0, 2.0, 1.0)
 
     def real(of):
         return np.ascontiguousarray(np.hstack([of.real, -of.imag]))
 
-    look = real(rows @ shape[:n]), real(rows @ shape[n:])
-    lengths = tick * 2.0 ** np.arange(top + 1)
+    look = np.array([real(rows @ of) for of in (shape[:n], shape[n:])])
     decay = np.exp(np.outer(lengths, exponent))
-    kicks = [(np.expm1(exponent * t) / exponent)[:, None] * load for t in lengths[: h_level + 1]]
+    kicks = [(np.expm1(exponent * t) / exponent)[:, None] * load for t in lengths[: FINEST + 1]]
     kicks = np.array([np.vstack([kick.real, kick.imag]) for kick in (*kicks, load)])  # the last of impulses
-    answer = np.array([[row @ kick for kick in kicks] for row in look])
-    still = rows @ sag
-    fast = np.abs((rows @ shape[n:])), np.abs(rows @ whirl[n:])
-    bins = np.zeros((q, n_sample * 2**coarsest))
-    states = np.zeros((n_sample + 1, 2 * len(exponent)))
-    laws, table = read_laws(case)
-    laws[8] = interval / 2**coarsest / 2  # fade
+    answer = (look[:, None] @ kicks).reshape(2, -1, q, m, q, m).transpose(0, 1, 2, 4, 3, 5).copy()
+    steady = np.array([rows @ whirl[:n], rows @ sag, rows @ whirl[n:]])
+    bins, states = np.zeros((q, n_sample * 2**halved)), np.zeros((n_sample + 1, 2 * len(exponent)))
     sums = np.zeros((6, q))
-    counts = march(
+    converged = march(
         np.concatenate([z.real, z.imag]),
-        states,
-        bins,
-        sums,
-        (decay.real.copy(), decay.imag.copy(), kicks, answer, *look),
-        (rows @ whirl[:n], still, *fast),
+        (states, bins, sums),
+        (decay.real.copy(), decay.imag.copy(), kicks, answer, look, np.abs(rows @ shape[n:]), steady),
         (radius, clearance, abs(spin) * radius),
-        (spin, tick, top, h_level, per_revolution, m),
+        (np.sign(spin), lengths, per_revolution),
         laws,
         table,
     )
-    assert counts >= 0, "the contact problem did not converge"
+    assert converged, "the contact problem did not converge"
     turns = np.exp(1j * np.sign(spin) * 2 * math.pi * np.arange(n_sample + 1) / per_revolution)
     motion = states @ real(shape).T + np.outer(turns, whirl).real
-    motion[:, :n] += sag
-    of = np.concatenate([bodies.output, *bodies.rows[:, 3:].T])
-    signals = np.where(of >= 0, motion[:-1, of], 0.0).T
-    force = bins.reshape(q, n_sample, -1).sum(axis=2) / interval
-    touched = np.maximum(sums[0], 1e-300)
-    per = dict(zip(("contact", "stick", "friction", "normal", "total", "contacts"), sums, strict=True))
-    u, v = motion[:, :n] - sag, motion[:, n:]
+    u, v = motion[:, :n], motion[:, n:]
     symmetric = (bodies.stiffness + bodies.stiffness.T) / 2
+    energy = 0.5 * ((u @ symmetric * u).sum(axis=1) + (v @ bodies.mass * v).sum(axis=1))
+    of = np.concatenate([bodies.output, *bodies.rows[:, 3:].T])
+    signals = np.where(of >= 0, (u + sag)[:-1, of], 0.0).T
+    contact, stick, friction, normal, both, contacts = sums
     return {
         "vertical": signals[0],
         "horizontal": signals[1],
         "torsion": signals[2],
         "stator_axial": signals[3 : 3 + q],
         "stator_lateral": signals[3 + q :],
-        "contact_force": force,
-        "peak_contact_force": peak(bins, interval / 2**coarsest),
+        "contact_force": bins.reshape(q, n_sample, -1).sum(axis=2) / interval,
+        "peak_contact_force": peak(bins, lengths[FINEST]),
         "contact_impulse": bins.sum(axis=1) / revolutions,
-        "contact_fraction": per["contact"] / (n_sample * interval),
-        "stick_fraction": per["stick"] / touched,
-        "friction_work": per["friction"] / revolutions,
-        "contacts_per_revolution": per["contacts"] / revolutions,
-        "normal_work": per["normal"],
-        "contact_work": per["total"],
-        "energy": 0.5 * ((u @ symmetric * u).sum(axis=1) + (v @ bodies.mass * v).sum(axis=1)),
+        "contact_fraction": contact / (n_sample * interval),
+        "stick_fraction": stick / np.maximum(contact, 1e-300),
+        "friction_work": friction / revolutions,
+        "contacts_per_revolution": contacts / revolutions,
+        "normal_work": normal,
+        "contact_work": both,
+        "energy": energy,
     }
 
 
-def read_laws(case):
+def at_rest(bodies, rows, radius, clearance, laws):
+    """Where loads hold the shaft, and where they do with stators that it rests on without friction; (n,)."""
+    sag = np.linalg.solve(bodies.stiffness, bodies.weight)
+    give = np.linalg.solve(bodies.stiffness, rows.reshape(-1, rows.shape[-1]).T)
+    give = give.reshape(-1, *rows.shape[:2]).transpose(1, 0, 2)  # (q, n, m)
+    force, pressed, along = np.zeros(len(rows)), np.zeros((len(rows), len(sag))), np.zeros((2, rows.shape[1]))
+    power = {HARD: 1.0, PENALTY: 1.0, HERTZ: 1.5}[laws[0]]
+    for _ in range(3000):
+        for i, row in enumerate(rows):
+            gap = look_at(row @ (sag + pressed.sum(axis=0)), radius[i], clearance[i], laws, 1.0, *along)
+            held = (force[i] / laws[1]) ** (1 / power) if laws[0] != HARD else 0.0
+            slope = along[0] @ row @ give[i] @ along[0]
+            slope += held / (power * force[i]) if held else 0.0
+            force[i] = max(0.0, force[i] - 0.5 * (gap + held) / slope)
+            pressed[i] = force[i] * (give[i] @ along[0])
+        if not force.any():
+            break
+    return sag, sag + pressed.sum(axis=0)
+
+
+def read_laws(case, fade):
     """Numbers of the laws, and of a friction table (2, n): slip speeds and coefficients."""
-    kind = {"lagrange": HARD, "penalty": PENALTY, "hertz": HERTZ}[case.get("law", "lagrange")]
-    friction = ("sliding", "coulomb", "stribeck", "table").index(case.get("friction_law", "sliding"))
-    mu = case["friction"]
-    table = np.array([case.get("slip_speed", (0.0,)), np.array(case.get("friction_ratio", (1.0,))) * mu])
-    ratio = case.get("static_friction_ratio", 1.0)
-    return np.array(
-        [
-            kind,
-            case.get("stiffness", 0.0),
-            case.get("damping", 0.0),
-            case.get("restitution", 0.0) or 0.0,
-            friction,
-            mu,
-            ratio * mu,
-            case.get("stribeck_speed", 1.0),
-            0.0,
-            case.get("normal", "fixed") == "updated",
-        ]
-    ), table
+    mu, names = case["friction"], ("sliding", "coulomb", "stribeck", "table")
+    laws = (
+        {"lagrange": HARD, "penalty": PENALTY, "hertz": HERTZ}[case.get("law", "lagrange")],
+        case.get("stiffness", 0.0),
+        case.get("damping", 0.0),
+        case.get("restitution", 0.0),
+        names.index(case.get("friction_law", "sliding")),
+        mu,
+        mu * case.get("static_friction_ratio", 1.0),
+        case.get("stribeck_speed", 1.0),
+        fade,
+        case.get("normal", "fixed") == "updated",
+    )
+    table = case.get("slip_speed", (0.0,)), mu * np.array(case.get("friction_ratio", (1.0,)))
+    return np.array(laws, dtype=float), np.array(table)
 
 
 def peak(bins, width):
@@ -248,12 +251,10 @@ def look_at(x, radius, clearance, laws, sense, along, across):
 def spring(gap, rate, laws):
     """Normal force of a spring, and its slopes with gap and rate."""
     k, c = laws[1], laws[2]
-    if gap >= 0.0:
-        return 0.0, 0.0, 0.0
     if laws[0] == PENALTY:
         force, by_gap, by_rate = -k * gap - c * rate, -k, -c
     else:
-        root = math.sqrt(-gap)
+        root = math.sqrt(max(-gap, 0.0))
         elastic = -k * gap * root
         force = elastic * (1.0 - c * rate)
         by_gap, by_rate = -1.5 * k * root * (1.0 - c * rate), -c * elastic
@@ -273,89 +274,58 @@ def coefficient(slip, laws, table):
 
 
 @njit(cache=True)
-def solve_pairs(
-    active,
-    was,
-    x,
-    v,
-    gap0,
-    gap1,
-    slip0,
-    n_dir,
-    t_dir,
-    by_x,
-    by_v,
-    targets,
-    dt,
-    given,
-    m,
-    sense,
-    laws,
-    table,
-    normal,
-    tangent,
-    state,
-):
-    """Forces (or impulses, dt = 0) of the active pairs from their motions without them; False if none."""
-    radius, clearance, rim = given
-    q = was.size
-    al, ac = np.zeros(m), np.zeros(m)
-    px, pv = np.zeros(m), np.zeros(m)
-    xn, xt, vn, vt = np.zeros((q, q, m)), np.zeros((q, q, m)), np.zeros((q, q, m)), np.zeros((q, q, m))
+def see(x, v, pair, laws, sense, along, across):
+    """Gap, its rate and the slip of a pair; fills its directions."""
+    radius, clearance, rim = pair
+    gap = look_at(x, radius, clearance, laws, sense, along, across)
+    return gap, along @ v, rim - across @ v
+
+
+@njit(cache=True)
+def solve_pairs(active, was, x, v, before, n_dir, t_dir, by_x, by_v, dt, given, sense, laws, table, out):
+    """Forces (or impulses, dt = 0) of the active pairs from their motions without them; False if none.
+
+    `before`: gap, slip, gap at the touch, and gap rate (in an impact the one that it leaves).
+    `out`: normal, tangent, state.
+    """
+    q, m = x.shape
+    normal, tangent, state = out
+    al, ac, px, pv, unit = np.zeros(m), np.zeros(m), np.zeros(m), np.zeros(m), np.zeros((4, q, q, m))
     for i in range(q):
         for j in range(q):
             if active[i] and active[j]:
-                for a in range(m):
-                    for b in range(m):
-                        xn[i, j, a] += by_x[i * m + a, j * m + b] * n_dir[j, b]
-                        xt[i, j, a] += by_x[i * m + a, j * m + b] * t_dir[j, b]
-                        vn[i, j, a] += by_v[i * m + a, j * m + b] * n_dir[j, b]
-                        vt[i, j, a] += by_v[i * m + a, j * m + b] * t_dir[j, b]
-    for sweep in range(2000):
+                unit[0, i, j], unit[1, i, j] = by_x[i, j] @ n_dir[j], by_x[i, j] @ t_dir[j]
+                unit[2, i, j], unit[3, i, j] = by_v[i, j] @ n_dir[j], by_v[i, j] @ t_dir[j]
+    for _ in range(2000):
         change, size, noise = 0.0, 0.0, 0.0
         for i in range(q):
             if not active[i]:
                 continue
-            for a in range(m):
-                px[a], pv[a] = x[i * m + a], v[i * m + a]
-                for j in range(q):
-                    if active[j]:
-                        px[a] += xn[i, j, a] * normal[j] + xt[i, j, a] * tangent[j]
-                        pv[a] += vn[i, j, a] * normal[j] + vt[i, j, a] * tangent[j]
-            gap = look_at(px, radius[i], clearance[i], laws, sense, al, ac)
-            rate, slip, sizes = 0.0, rim[i], abs(clearance[i]) / laws[8]
-            gn, gt, rn, rt, sn, st = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-            for a in range(m):
-                rate += al[a] * pv[a]
-                slip -= ac[a] * pv[a]
-                sizes += abs(al[a]) * (abs(pv[a]) + abs(px[a]) / laws[8])
-                gn += al[a] * xn[i, i, a]
-                gt += al[a] * xt[i, i, a]
-                rn += al[a] * vn[i, i, a]
-                rt += al[a] * vt[i, i, a]
-                sn -= ac[a] * vn[i, i, a]
-                st -= ac[a] * vt[i, i, a]
+            px[:], pv[:] = x[i], v[i]
+            for j in range(q):
+                if active[j]:
+                    px += unit[0, i, j] * normal[j] + unit[1, i, j] * tangent[j]
+                    pv += unit[2, i, j] * normal[j] + unit[3, i, j] * tangent[j]
+            gap, rate, slip = see(px, pv, (given[0][i], given[1][i], given[2][i]), laws, sense, al, ac)
+            gn, gt, rn, rt = al @ unit[0, i, i], al @ unit[1, i, i], al @ unit[2, i, i], al @ unit[3, i, i]
+            sn, st = -(ac @ unit[2, i, i]), -(ac @ unit[3, i, i])
             if dt == 0.0:
-                c, cn, ct = rate - targets[i], rn, rt
+                c, cn, ct = rate - before[3, i], rn, rt
             elif laws[0] == HARD:
-                c, cn, ct = rate + (gap - gap1[i]) / laws[8], rn + gn / laws[8], rt + gt / laws[8]
+                c, cn, ct = rate + (gap - before[2, i]) / laws[8], rn + gn / laws[8], rt + gt / laws[8]
             else:
-                f, fg, fr = spring(0.5 * (gap0[i] + gap), (gap - gap0[i]) / dt, laws)
-                c = normal[i] - f
-                slope = 0.5 * fg + fr / dt
-                cn, ct = 1.0 - slope * gn, -slope * gt
+                f, fg, fr = spring(0.5 * (before[0, i] + gap), 0.5 * (before[3, i] + rate), laws)
+                c, cn = normal[i] - f, 1.0 - 0.5 * (fg * gn + fr * rn)
+                ct = -0.5 * (fg * gt + fr * rt)
             c0 = c - cn * normal[i] - ct * tangent[i]
             s0 = slip - sn * normal[i] - st * tangent[i]
-            mu = coefficient(0.5 * (slip + slip0[i]), laws, table)
-            rest = coefficient(0.0, laws, table)
-            if laws[4] == COULOMB and was[i] == STUCK:
-                rest = laws[6]
+            mu = coefficient(0.5 * (slip + before[1, i]), laws, table)
+            rest = laws[6] if laws[4] == COULOMB and was[i] == STUCK else coefficient(0.0, laws, table)
             p, t, found = 0.0, 0.0, OPEN
             if c0 < 0.0:
-                whole = cn * st - ct * sn
                 if laws[4] != SLIDING:
-                    p, t = (s0 * ct - c0 * st) / whole, (c0 * sn - s0 * cn) / whole
-                    found = STUCK
+                    whole = cn * st - ct * sn
+                    p, t, found = (s0 * ct - c0 * st) / whole, (c0 * sn - s0 * cn) / whole, STUCK
                 if laws[4] == SLIDING or p < 0.0 or abs(t) > rest * p:
                     p, found = -c0 / (cn + mu * ct), FORWARD
                     t = mu * p
@@ -364,7 +334,8 @@ def solve_pairs(
                         t = -mu * p
             change = max(change, abs(p - normal[i]), abs(t - tangent[i]))
             size = max(size, abs(p), abs(t))
-            noise = max(noise, 4e-16 * sizes / rn)
+            sizes = np.abs(al) @ (np.abs(pv) + np.abs(px) / laws[8]) + abs(given[1][i]) / laws[8]
+            noise = max(noise, 4e-16 * sizes / rn)  # of rounding
             normal[i], tangent[i], state[i] = p, t, found
         if change <= 1e-12 * size + noise:
             return True
@@ -372,206 +343,138 @@ def solve_pairs(
 
 
 @njit(cache=True)
-def march(y, states, bins, sums, tables, forced, given, grid, laws, table):
-    """March through all samples; -1 where the contact problem has not converged."""
-    decay_re, decay_im, kicks, answer, look_x, look_v = tables
-    whirl, still, fast, whirl_fast = forced
-    radius, clearance, rim = given
-    spin, tick, top, h_level, per_revolution, m = grid
-    q, k_mode = radius.size, decay_re.shape[1]
-    sense = 1.0 if spin > 0 else -1.0
+def march(y, kept, tables, given, grid, laws, table):
+    """March through all samples; False where a contact problem has not converged."""
+    states, bins, sums = kept
+    decay_re, decay_im, kicks, answer, look, fast, steady = tables
+    sense, lengths, per_revolution = grid
+    top, q, half, m = lengths.size - 1, bins.shape[0], y.size // 2, answer.shape[4]
     per_turn = per_revolution * 2**top
-    state, found, active = np.zeros(q, np.int64), np.zeros(q, np.int64), np.zeros(q, np.bool_)
-    normal, tangent, p_n, p_t = np.zeros(q), np.zeros(q), np.zeros(q), np.zeros(q)
-    n_dir, t_dir, gap0, slip0, rate0, targets = (
-        np.zeros((q, m)),
-        np.zeros((q, m)),
-        np.zeros(q),
-        np.zeros(q),
-        np.zeros(q),
-        np.zeros(q),
-    )
+    state, active, hit = np.zeros(q, np.int64), np.zeros(q, np.bool_), np.zeros(q, np.bool_)
+    found, normal, tangent = np.zeros(q, np.int64), np.zeros(q), np.zeros(q)
+    held = np.zeros((2, q))  # forces of the step before
+    n_dir, t_dir, before, load = np.zeros((q, m)), np.zeros((q, m)), np.zeros((4, q)), np.zeros((q, m))
     al, ac = np.zeros(m), np.zeros(m)
-    hit, gap1, touch = np.zeros(q, np.bool_), np.zeros(q), np.full(q, -SHORTEST)
-    load, middle, sizes = np.zeros(q * m), np.zeros(q * m), np.zeros(k_mode)
-    y1 = y.copy()
-    t, last, hardest = 0, states.shape[0] - 1, 0.0
-    n_bin = bins.shape[1]
-    end = last * 2**top
+    touch, hardest, t = np.full(q, -SHORTEST), 0.0, 0
+
+    def motions(of, at):
+        angle = sense * 2.0 * math.pi * (at % per_turn) / per_turn
+        e = complex(math.cos(angle), math.sin(angle))
+        x = look[0] @ of + (steady[0] * e + steady[1]).real
+        return x.reshape(q, m), (look[1] @ of + (steady[2] * e).real).reshape(q, m)
+
     while True:
         if t % 2**top == 0:
             states[t // 2**top] = y
-            if t == end:
-                return 0
-        angle = sense * 2.0 * math.pi * (t % per_turn) / per_turn
-        e = complex(math.cos(angle), math.sin(angle))
-        x0 = look_x @ y + (whirl * e).real + still
-        v0 = look_v @ y + (whirl * e * (1j * spin)).real
-        nearest, is_closed = 1e9, False
+            if t // 2**top == states.shape[0] - 1:
+                return True
+        x0, v0 = motions(y, t)
+        level, is_closed = FINEST, np.any(state != OPEN)
+        speed = fast @ np.hypot(y[:half], y[half:]) + np.abs(steady[2])
+        reach = 1e9  # until when no gap can close
         for i in range(q):
-            gap0[i] = look_at(x0[i * m : (i + 1) * m], radius[i], clearance[i], laws, sense, al, ac)
-            rate0[i], slip0[i] = 0.0, rim[i]
-            for a in range(m):
-                rate0[i] += al[a] * v0[i * m + a]
-                slip0[i] -= ac[a] * v0[i * m + a]
-            is_closed = is_closed or state[i] != OPEN
-        level = h_level
-        if not is_closed:  # as far as no gap can close
-            for k in range(k_mode):
-                sizes[k] = math.hypot(y[k], y[k_mode + k])
-            speed = fast @ sizes + whirl_fast
-            reach = 1e9
-            for i in range(q):
-                closing = speed[i * m] + speed[i * m + 1] * (0.02 + abs(x0[i * m + 1]) / radius[i])
-                for a in range(3, m):
-                    closing += speed[i * m + a] * (abs(x0[i * m + a]) + 1e-3)
-                reach = min(reach, max(gap0[i], 0.0) / closing)
-            while level < top and tick * 2.0 ** (level + 1) < 0.7 * reach:
-                level += 1
+            pair = given[0][i], given[1][i], given[2][i]
+            before[0, i], before[3, i], before[1, i] = see(x0[i], v0[i], pair, laws, sense, al, ac)
+            of = speed[i * m : (i + 1) * m]
+            closing = of[0] + of[1] * (0.02 + abs(x0[i, 1]) / pair[0]) + of[3:] @ (np.abs(x0[i, 3:]) + 1e-3)
+            reach = min(reach, max(before[0, i], 0.0) / closing)
+        while not is_closed and level < top and lengths[level + 1] < 0.7 * reach:
+            level += 1
         while t % 2**level != 0:
             level -= 1
         while True:  # until a step is taken
-            dt = tick * 2.0**level
-            for k in range(k_mode):
-                y1[k] = decay_re[level, k] * y[k] - decay_im[level, k] * y[k_mode + k]
-                y1[k_mode + k] = decay_im[level, k] * y[k] + decay_re[level, k] * y[k_mode + k]
-            angle = sense * 2.0 * math.pi * ((t + 2**level) % per_turn) / per_turn
-            e = complex(math.cos(angle), math.sin(angle))
-            x = look_x @ y1 + (whirl * e).real + still
-            v = look_v @ y1 + (whirl * e * (1j * spin)).real
-            any_active, any_hit = False, False
+            dt, re, im = lengths[level], decay_re[level], decay_im[level]
+            free = np.concatenate((re * y[:half] - im * y[half:], im * y[:half] + re * y[half:]))
+            x, v = motions(free, t + 2**level)
             for i in range(q):
-                gap = look_at(x[i * m : (i + 1) * m], radius[i], clearance[i], laws, sense, al, ac)
-                rate = 0.0
-                for a in range(m):
-                    rate += al[a] * v[i * m + a]
-                active[i] = state[i] != OPEN or (laws[0] != HARD and gap + gap0[i] < 0.0)
+                pair = given[0][i], given[1][i], given[2][i]
+                gap, rate, _ = see(x[i], v[i], pair, laws, sense, al, ac)
+                active[i] = state[i] != OPEN or (laws[0] != HARD and gap + before[0, i] < 0.0)
                 hit[i] = laws[0] == HARD and state[i] == OPEN and gap < -UNSEEN and rate < 0.0
-                any_active, any_hit = any_active or active[i], any_hit or hit[i]
-                middle[i * m : (i + 1) * m] = 0.5 * (x0[i * m : (i + 1) * m] + x[i * m : (i + 1) * m])
-                look_at(middle[i * m : (i + 1) * m], radius[i], clearance[i], laws, sense, n_dir[i], t_dir[i])
-                found[i] = OPEN
-                p_n[i], p_t[i] = normal[i] * active[i], tangent[i] * active[i]
-            if any_active and level > h_level:
-                level = h_level
+                look_at(0.5 * (x0[i] + x[i]), pair[0], pair[1], laws, sense, n_dir[i], t_dir[i])
+                found[i], normal[i], tangent[i] = OPEN, held[0, i] * active[i], held[1, i] * active[i]
+            if np.any(active) and level > FINEST:
+                level = FINEST
                 continue
-            if any_active:
-                done = solve_pairs(
-                    active,
-                    state,
-                    x,
-                    v,
-                    gap0,
-                    gap1,
-                    slip0,
-                    n_dir,
-                    t_dir,
-                    answer[0, level],
-                    answer[1, level],
-                    targets,
-                    dt,
-                    given,
-                    m,
-                    sense,
-                    laws,
-                    table,
-                    p_n,
-                    p_t,
-                    found,
-                )
-                if not done:
-                    return -1
-            has_changed = any_hit
+            if np.any(active) and not solve_pairs(
+                active,
+                state,
+                x,
+                v,
+                before,
+                n_dir,
+                t_dir,
+                answer[0, level],
+                answer[1, level],
+                dt,
+                given,
+                sense,
+                laws,
+                table,
+                (normal, tangent, found),
+            ):
+                return False
+            if level == 0 or not (np.any(hit) or np.any(found != state)):
+                break
+            level -= 1
+        y, here = free, t >> FINEST
+        if np.any(active):
             for i in range(q):
-                has_changed = has_changed or found[i] != state[i]
-            if has_changed and level > 0:
-                level -= 1
-                continue
-            break
-        y, y1 = y1, y
-        here = t // 2**h_level
-        for i in range(q):
-            for a in range(m):
-                load[i * m + a] = n_dir[i, a] * p_n[i] + t_dir[i, a] * p_t[i] if active[i] else 0.0
-        if any_active:
-            y += kicks[level] @ load
-            dx = x + answer[0, level] @ load - x0
+                load[i] = n_dir[i] * normal[i] + t_dir[i] * tangent[i]
+            y += kicks[level] @ load.ravel()
+            gone = motions(y, t + 2**level)[0] - x0
             for i in range(q):
-                if p_n[i] > 0.0:
-                    gone, moved, part = 0.0, 0.0, 0.0
-                    for a in range(m):
-                        gone += t_dir[i, a] * dx[i * m + a]
-                        moved += n_dir[i, a] * dx[i * m + a]
-                    bins[i, here] += p_n[i] * dt
+                if normal[i] > 0.0:
+                    bins[i, here] += normal[i] * dt
                     sums[0, i] += dt
                     sums[1, i] += dt * (found[i] == STUCK)
-                    sums[2, i] += p_t[i] * (rim[i] * dt - gone)
-                    sums[3, i] += p_n[i] * moved
-                    sums[4, i] += p_n[i] * moved + p_t[i] * gone
-        for i in range(q):
-            sums[5, i] += found[i] != OPEN and state[i] == OPEN
-            state[i], normal[i], tangent[i] = found[i], p_n[i], p_t[i]
+                    sums[2, i] += tangent[i] * (given[2][i] * dt - t_dir[i] @ gone[i])
+                    sums[3, i] += normal[i] * (n_dir[i] @ gone[i])
+                    sums[4, i] += load[i] @ gone[i]
+        sums[5] += (found != OPEN) & (state == OPEN)
+        held[0], held[1], state[:] = normal, tangent, found
         t += 2**level
-        if not any_hit:
+        if not np.any(hit):
             continue
-        # Impulses of the pairs that touch, and of those that are closed.
-        x = look_x @ y + (whirl * e).real + still
-        v = look_v @ y + (whirl * e * (1j * spin)).real
+        x, v = motions(y, t)  # impulses of the pairs that touch, and of those that are closed
         for i in range(q):
-            gap = look_at(x[i * m : (i + 1) * m], radius[i], clearance[i], laws, sense, n_dir[i], t_dir[i])
-            rate, slip = 0.0, rim[i]
-            for a in range(m):
-                rate += n_dir[i, a] * v[i * m + a]
-                slip -= t_dir[i, a] * v[i * m + a]
+            pair = given[0][i], given[1][i], given[2][i]
+            gap, rate, before[1, i] = see(x[i], v[i], pair, laws, sense, n_dir[i], t_dir[i])
             active[i] = hit[i] or state[i] != OPEN
-            back = laws[3] if t - touch[i] > SHORTEST else 0.0
+            before[3, i] = min(rate, 0.0)
             if hit[i]:
-                hardest = max(hardest, -rate)
-                gap1[i], touch[i] = gap, t
-            rate0[i], slip0[i] = rate, slip
-            targets[i] = -back * rate if hit[i] else min(rate, 0.0)
-            p_n[i], p_t[i], found[i] = 0.0, 0.0, OPEN
-        done = solve_pairs(
+                before[3, i] = -rate * (laws[3] if t - touch[i] > SHORTEST else 0.0)
+                before[2, i], touch[i], hardest = gap, t, max(hardest, -rate)
+            normal[i], tangent[i], found[i] = 0.0, 0.0, OPEN
+        if not solve_pairs(
             active,
             state,
             x,
             v,
-            gap0,
-            gap1,
-            slip0,
+            before,
             n_dir,
             t_dir,
             answer[0, -1],
             answer[1, -1],
-            targets,
             0.0,
             given,
-            m,
             sense,
             laws,
             table,
-            p_n,
-            p_t,
-            found,
-        )
-        if not done:
-            return -1
+            (normal, tangent, found),
+        ):
+            return False
         for i in range(q):
-            for a in range(m):
-                load[i * m + a] = n_dir[i, a] * p_n[i] + t_dir[i, a] * p_t[i] if active[i] else 0.0
-        y += kicks[-1] @ load
-        change = answer[1, -1] @ load
+            load[i] = n_dir[i] * normal[i] + t_dir[i] * tangent[i]
+        y += kicks[-1] @ load.ravel()
+        after = motions(y, t)[1]
         for i in range(q):
-            if not active[i]:
-                continue
-            rate, slip = rate0[i], slip0[i]
-            for a in range(m):
-                rate += n_dir[i, a] * change[i * m + a]
-                slip -= t_dir[i, a] * change[i * m + a]
-            bins[i, min(here, n_bin - 1)] += p_n[i]
-            sums[2, i] += p_t[i] * 0.5 * (slip + slip0[i])
-            sums[3, i] += p_n[i] * 0.5 * (rate + rate0[i])
-            sums[4, i] += p_n[i] * 0.5 * (rate + rate0[i]) + p_t[i] * (rim[i] - 0.5 * (slip + slip0[i]))
-            sums[5, i] += hit[i]
-            is_away = rate > REST * hardest
-            state[i] = OPEN if is_away else (found[i] if found[i] != OPEN else max(state[i], FORWARD))
+            if active[i]:
+                mean = 0.5 * (v[i] + after[i])
+                bins[i, here] += normal[i]
+                sums[2, i] += tangent[i] * (given[2][i] - t_dir[i] @ mean)
+                sums[3, i] += normal[i] * (n_dir[i] @ mean)
+                sums[4, i] += load[i] @ mean
+                sums[5, i] += hit[i]
+                stays = n_dir[i] @ after[i] <= REST * hardest
+                state[i] = max(found[i], state[i], FORWARD) if stays else OPEN
