@@ -286,10 +286,10 @@ def solve_pairs(active, was, x, v, before, n_dir, t_dir, by_x, by_v, dt, given, 
     """Forces (or impulses, dt = 0) of the active pairs from their motions without them; False if none.
 
     `before`: gap, slip, gap at the touch, and gap rate (in an impact the one that it leaves).
-    `out`: normal, tangent, state.
+    `out`: normal, tangent, state, and whether a spring is slack at the end.
     """
     q, m = x.shape
-    normal, tangent, state = out
+    normal, tangent, state, slack = out
     al, ac, px, pv, unit = np.zeros(m), np.zeros(m), np.zeros(m), np.zeros(m), np.zeros((4, q, q, m))
     for i in range(q):
         for j in range(q):
@@ -314,6 +314,7 @@ def solve_pairs(active, was, x, v, before, n_dir, t_dir, by_x, by_v, dt, given, 
             elif laws[0] == HARD:
                 c, cn, ct = rate + (gap - before[2, i]) / laws[8], rn + gn / laws[8], rt + gt / laws[8]
             else:
+                slack[i] = spring(gap, rate, laws)[0] == 0.0
                 f, fg, fr = spring(0.5 * (before[0, i] + gap), 0.5 * (before[3, i] + rate), laws)
                 c, cn = normal[i] - f, 1.0 - 0.5 * (fg * gn + fr * rn)
                 ct = -0.5 * (fg * gt + fr * rt)
@@ -352,10 +353,11 @@ def march(y, kept, tables, given, grid, laws, table):
     per_turn = per_revolution * 2**top
     state, active, hit = np.zeros(q, np.int64), np.zeros(q, np.bool_), np.zeros(q, np.bool_)
     found, normal, tangent = np.zeros(q, np.int64), np.zeros(q), np.zeros(q)
+    ends = np.zeros(q, np.bool_)  # of pairs that touch or go slack within a step
     held = np.zeros((2, q))  # forces of the step before
     n_dir, t_dir, before, load = np.zeros((q, m)), np.zeros((q, m)), np.zeros((4, q)), np.zeros((q, m))
     al, ac = np.zeros(m), np.zeros(m)
-    touch, hardest, t = np.full(q, -SHORTEST), 0.0, 0
+    left, hardest, t = np.full(q, -SHORTEST), 0.0, 0  # when pairs opened
 
     def motions(of, at):
         angle = sense * 2.0 * math.pi * (at % per_turn) / per_turn
@@ -390,6 +392,7 @@ def march(y, kept, tables, given, grid, laws, table):
                 pair = given[0][i], given[1][i], given[2][i]
                 gap, rate, _ = see(x[i], v[i], pair, laws, sense, al, ac)
                 active[i] = state[i] != OPEN or (laws[0] != HARD and gap + before[0, i] < 0.0)
+                ends[i] = laws[0] != HARD and state[i] == OPEN and gap < 0.0 <= before[0, i]
                 hit[i] = laws[0] == HARD and state[i] == OPEN and gap < -UNSEEN and rate < 0.0
                 look_at(0.5 * (x0[i] + x[i]), pair[0], pair[1], laws, sense, n_dir[i], t_dir[i])
                 found[i], normal[i], tangent[i] = OPEN, held[0, i] * active[i], held[1, i] * active[i]
@@ -411,10 +414,10 @@ def march(y, kept, tables, given, grid, laws, table):
                 sense,
                 laws,
                 table,
-                (normal, tangent, found),
+                (normal, tangent, found, ends),
             ):
                 return False
-            if level == 0 or not (np.any(hit) or np.any(found != state)):
+            if level == 0 or not (np.any(hit) or np.any(found != state) or np.any(ends)):
                 break
             level -= 1
         y, here = free, t >> FINEST
@@ -431,9 +434,11 @@ def march(y, kept, tables, given, grid, laws, table):
                     sums[2, i] += tangent[i] * (given[2][i] * dt - t_dir[i] @ gone[i])
                     sums[3, i] += normal[i] * (n_dir[i] @ gone[i])
                     sums[4, i] += load[i] @ gone[i]
-        sums[5] += (found != OPEN) & (state == OPEN)
-        held[0], held[1], state[:] = normal, tangent, found
         t += 2**level
+        for i in range(q):
+            sums[5, i] += found[i] != OPEN and state[i] == OPEN and t - left[i] >= SHORTEST
+            left[i] = t if found[i] == OPEN and state[i] != OPEN else left[i]
+        held[0], held[1], state[:] = normal, tangent, found
         if not np.any(hit):
             continue
         x, v = motions(y, t)  # impulses of the pairs that touch, and of those that are closed
@@ -443,8 +448,8 @@ def march(y, kept, tables, given, grid, laws, table):
             active[i] = hit[i] or state[i] != OPEN
             before[3, i] = min(rate, 0.0)
             if hit[i]:
-                before[3, i] = -rate * (laws[3] if t - touch[i] > SHORTEST else 0.0)
-                before[2, i], touch[i], hardest = gap, t, max(hardest, -rate)
+                before[3, i] = -rate * (laws[3] if t - left[i] >= SHORTEST else 0.0)
+                before[2, i], hardest = gap, max(hardest, -rate)
             normal[i], tangent[i], found[i] = 0.0, 0.0, OPEN
         if not solve_pairs(
             active,
@@ -461,7 +466,7 @@ def march(y, kept, tables, given, grid, laws, table):
             sense,
             laws,
             table,
-            (normal, tangent, found),
+            (normal, tangent, found, ends),
         ):
             return False
         for i in range(q):
@@ -475,6 +480,8 @@ def march(y, kept, tables, given, grid, laws, table):
                 sums[2, i] += tangent[i] * (given[2][i] - t_dir[i] @ mean)
                 sums[3, i] += normal[i] * (n_dir[i] @ mean)
                 sums[4, i] += load[i] @ mean
-                sums[5, i] += hit[i]
-                stays = n_dir[i] @ after[i] <= REST * hardest
+                sums[5, i] += hit[i] and t - left[i] >= SHORTEST
+                drift = 0.0 if hit[i] else max(n_dir[i] @ v[i], 0.0)
+                stays = n_dir[i] @ after[i] - drift <= REST * hardest
                 state[i] = max(found[i], state[i], FORWARD) if stays else OPEN
+                left[i] = left[i] if stays else t
