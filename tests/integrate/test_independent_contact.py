@@ -11,8 +11,27 @@ from scipy.integrate import quad, solve_ivp
 
 from rubhpc import simulate
 
-ACCURACY = 1e-4
-SUPPORTED = ()
+ACCURACY = 1e-3
+SUPPORTED = (
+    "linear, sliding",
+    "linear, stick",
+    "linear, penalty",
+    "updated, sliding",
+    "bent, fixed",
+    "bent, sliding",
+    "bent, fast",
+    "bent, restitution",
+    "updated, penalty",
+    "updated, stribeck",
+    "three masses, penalty",
+    "four masses",
+    "four masses, stick",
+    "four masses, restitution",
+    "eight masses",
+    "wall",
+    "overhung",
+    "carrier",
+)
 
 
 @pytest.mark.parametrize("name", SUPPORTED)

@@ -140,10 +140,11 @@ def march_bodies(bodies, spin, case, radius, angle, clearance, longest_step, sta
     answer = (look[:, None] @ kicks).reshape(2, -1, q, m, q, m).transpose(0, 1, 2, 4, 3, 5).copy()
     steady = np.array([rows @ whirl[:n], rows @ sag, rows @ whirl[n:]])
     bins, states = np.zeros((q, n_sample * 2**halved)), np.zeros((n_sample + 1, 2 * len(exponent)))
+    late = np.zeros(bins.shape, np.float32)  # how far into its bin an impulse is
     sums = np.zeros((6, q))
     converged = march(
         np.concatenate([z.real, z.imag]),
-        (states, bins, sums),
+        (states, bins, late, sums),
         (decay.real.copy(), decay.imag.copy(), kicks, answer, look, np.abs(rows @ shape[n:]), steady),
         (radius, clearance, abs(spin) * radius),
         (np.sign(spin), lengths, per_revolution),
@@ -166,7 +167,7 @@ def march_bodies(bodies, spin, case, radius, angle, clearance, longest_step, sta
         "stator_axial": signals[3 : 3 + q],
         "stator_lateral": signals[3 + q :],
         "contact_force": bins.reshape(q, n_sample, -1).sum(axis=2) / interval,
-        "peak_contact_force": peak(bins, lengths[FINEST]),
+        "peak_contact_force": peak(bins, late, lengths[FINEST]),
         "contact_impulse": bins.sum(axis=1) / revolutions,
         "contact_fraction": contact / (n_sample * interval),
         "stick_fraction": stick / np.maximum(contact, 1e-300),
@@ -217,15 +218,19 @@ def read_laws(case, fade):
     return np.array(laws, dtype=float), np.array(table)
 
 
-def peak(bins, width):
-    """Largest mean over 20 us, whole bins and a part of the next or the previous one."""
-    whole = int(MEAN_TIME / width)
-    part = MEAN_TIME / width - whole
-    padded = np.pad(bins, ((0, 0), (whole + 1, whole + 1)))
+def peak(bins, late, width):
+    """Largest mean over 20 us that begins with a bin or the impulse in it (`late`), or ends with a bin."""
+    span = MEAN_TIME / width
+    padded = np.pad(bins, ((0, 0), (math.ceil(span) + 2,) * 2))
     until = np.pad(np.cumsum(padded, axis=1), ((0, 0), (1, 0)))
-    sums = until[:, whole:] - until[:, :-whole]  # of the bins i to i + whole
-    after, before = sums[:, :-1] + part * padded[:, whole:], sums[:, 1:] + part * padded[:, :-whole]
-    return np.maximum(after.max(axis=1), before.max(axis=1)) / MEAN_TIME
+    first = np.arange(bins.shape[1]) + math.ceil(span) + 2
+    largest = np.zeros(len(bins))
+    for i, impulse in enumerate(until):
+        at = np.arange(len(impulse))
+        begun = np.interp(first + late[i] + span, at, impulse) - impulse[first]
+        ended = impulse[first] - np.interp(first - span, at, impulse)
+        largest[i] = max(begun.max(), ended.max()) / MEAN_TIME
+    return largest
 
 
 @njit(cache=True)
@@ -346,7 +351,7 @@ def solve_pairs(active, was, x, v, before, n_dir, t_dir, by_x, by_v, dt, given, 
 @njit(cache=True)
 def march(y, kept, tables, given, grid, laws, table):
     """March through all samples; False where a contact problem has not converged."""
-    states, bins, sums = kept
+    states, bins, late, sums = kept
     decay_re, decay_im, kicks, answer, look, fast, steady = tables
     sense, lengths, per_revolution = grid
     top, q, half, m = lengths.size - 1, bins.shape[0], y.size // 2, answer.shape[4]
@@ -476,6 +481,8 @@ def march(y, kept, tables, given, grid, laws, table):
         for i in range(q):
             if active[i]:
                 mean = 0.5 * (v[i] + after[i])
+                if bins[i, here] == 0.0:
+                    late[i, here] = t / 2**FINEST - here
                 bins[i, here] += normal[i]
                 sums[2, i] += tangent[i] * (given[2][i] - t_dir[i] @ mean)
                 sums[3, i] += normal[i] * (n_dir[i] @ mean)
@@ -483,5 +490,5 @@ def march(y, kept, tables, given, grid, laws, table):
                 sums[5, i] += hit[i] and t - left[i] >= SHORTEST
                 drift = 0.0 if hit[i] else max(n_dir[i] @ v[i], 0.0)
                 stays = n_dir[i] @ after[i] - drift <= REST * hardest
-                state[i] = max(found[i], state[i], FORWARD) if stays else OPEN
+                state[i] = (found[i] or max(state[i], FORWARD)) if stays else OPEN
                 left[i] = left[i] if stays else t
