@@ -30,6 +30,7 @@ SLIDING, COULOMB, STRIBECK, TABLE = range(4)
 FINEST = 11  # ticks are this many halvings of a step in contact
 SHORTEST = 256  # ticks: a pair that has flown for less does not rebound
 REST = 1e-5  # of the fastest touch: below it a pair that is hit stays closed
+IMPACT = 1e-7  # s, for which the forces of closed pairs resist what the impact of another does to them
 UNSEEN = 1e-15  # m, an overlap that is no touch yet
 
 
@@ -287,7 +288,7 @@ def see(x, v, pair, laws, sense, along, across):
 
 
 @njit(cache=True)
-def solve_pairs(active, was, x, v, before, n_dir, t_dir, by_x, by_v, dt, given, sense, laws, table, out):
+def solve_pairs(active, rested, x, v, before, n_dir, t_dir, by_x, by_v, dt, given, sense, laws, table, out):
     """Forces (or impulses, dt = 0) of the active pairs from their motions without them; False if none.
 
     `before`: gap, slip, gap at the touch, and gap rate (in an impact the one that it leaves).
@@ -326,7 +327,7 @@ def solve_pairs(active, was, x, v, before, n_dir, t_dir, by_x, by_v, dt, given, 
             c0 = c - cn * normal[i] - ct * tangent[i]
             s0 = slip - sn * normal[i] - st * tangent[i]
             mu = coefficient(0.5 * (slip + before[1, i]), laws, table)
-            rest = laws[6] if laws[4] == COULOMB and was[i] == STUCK else coefficient(0.0, laws, table)
+            rest = laws[6] if laws[4] == COULOMB and rested[i] else coefficient(0.0, laws, table)
             p, t, found = 0.0, 0.0, OPEN
             if c0 < 0.0:
                 if laws[4] != SLIDING:
@@ -389,6 +390,7 @@ def march(y, kept, tables, given, grid, laws, table):
             level += 1
         while t % 2**level != 0:
             level -= 1
+        rested = state == STUCK
         while True:  # until a step is taken
             dt, re, im = lengths[level], decay_re[level], decay_im[level]
             free = np.concatenate((re * y[:half] - im * y[half:], im * y[:half] + re * y[half:]))
@@ -406,7 +408,7 @@ def march(y, kept, tables, given, grid, laws, table):
                 continue
             if np.any(active) and not solve_pairs(
                 active,
-                state,
+                rested,
                 x,
                 v,
                 before,
@@ -455,12 +457,15 @@ def march(y, kept, tables, given, grid, laws, table):
             if hit[i]:
                 before[3, i] = -rate * (laws[3] if t - left[i] >= SHORTEST else 0.0)
                 before[2, i], hardest = gap, max(hardest, -rate)
-            normal[i], tangent[i], found[i] = 0.0, 0.0, OPEN
+            normal[i], tangent[i], found[i] = held[0, i] * IMPACT, held[1, i] * IMPACT, OPEN
+            load[i] = n_dir[i] * normal[i] + t_dir[i] * tangent[i]
+        without = v - (look[1] @ (kicks[-1] @ load.ravel())).reshape(q, m)
+        rested = state == STUCK
         if not solve_pairs(
             active,
-            state,
+            rested,
             x,
-            v,
+            without,
             before,
             n_dir,
             t_dir,
@@ -474,6 +479,8 @@ def march(y, kept, tables, given, grid, laws, table):
             (normal, tangent, found, ends),
         ):
             return False
+        normal -= held[0] * IMPACT
+        tangent -= held[1] * IMPACT
         for i in range(q):
             load[i] = n_dir[i] * normal[i] + t_dir[i] * tangent[i]
         y += kicks[-1] @ load.ravel()
