@@ -1,6 +1,6 @@
 """Cases of every gap, law and kind of machine, and their answers by `independent_contact`.
 
-`python tests/support/contact_answers.py` makes `tests/data/contact_answers.npz` anew: some 10 minutes.
+`python tests/support/contact_answers.py` makes `tests/data/contact_answers.npz` anew: some 20 minutes.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Matrices of rotor and stators set up another way, for `tests/reference.py`.
+"""Matrices of rotor, carriers and stators set up another way, for `independent_contact`.
 
 Element matrices come from the force method (flexibility and equilibrium) and bending is set up in the complex
 plane. Of the product it takes only the numbers of a rig.

@@ -101,7 +101,7 @@ def test_ten_revolutions_are_those_of_time_stepping(seed, static_ratio):
     assert usual.left_closed_form == 0
     assert usual.energy_residual < 1e-6
     case |= {"speed": usual.spin_speed, "clearance": usual.clearance, "samples_per_revolution": 256}
-    coarse, known = (run(rig, given | case, step) for step in (0.5e-6, 0.25e-6))
+    coarse, known = (run(rig, given | case, step) for step in (0.5e-6, 0.1e-6))
     halved = max(distance(coarse[name], known[name], name) for name in SIGNALS)
     exact = max(distance(getattr(whole, name), known[name], name) for name in SIGNALS)
     found = max(distance(getattr(usual, name), known[name], name) for name in SIGNALS)
