@@ -171,8 +171,8 @@ def test_on_a_periodic_motion_it_is_the_monodromy_matrix(law):
     assert sum(found[32:]) == pytest.approx(128 * math.log(abs(orbit.multipliers[0])), abs=4.0)
 
 
-def test_after_short_steps_it_goes_on_beside_a_second_motion(monkeypatch):
-    """One revolution in short steps breaks the trail: two motions then part as the multipliers say."""
+def test_after_collocation_it_goes_on_beside_a_second_motion(monkeypatch):
+    """One revolution by collocation breaks the trail: two motions then part as the multipliers say."""
     law, rig, speed = LAWS[2], trial_rig(2), 230.0
     setup, start = prepared(rig, speed, law)
     final = ended(rig, speed, 100, law)

@@ -19,8 +19,7 @@ SCHEMES = (
     "stick and slip",
     "periodic stick and slip",
     "run-up",
-    "short steps",
-    "curved gaps",
+    "collocation",
     "central differences",
 )
 
@@ -46,8 +45,7 @@ def use(scheme: str) -> None:
     options = {
         "events": {},
         "stick and slip": {"friction_law": "coulomb"},
-        "short steps": {"friction_law": "stribeck", "static_friction_ratio": 1.2, "stribeck_speed": 0.1},
-        "curved gaps": {"normal": "updated"},
+        "collocation": {"normal": "updated"},
         "central differences": {"method": "central-difference"},
     }
     if scheme == "neighbours":
@@ -96,7 +94,7 @@ def _copy_to(folder: Path) -> None:
 
 
 def _sources() -> str:
-    stats = [(path.name, path.stat()) for path in sorted(KERNELS.glob("*.py"))]
+    stats = [(path.name, path.stat()) for path in sorted(KERNELS.rglob("*.py"))]
     return repr(
         [sys.version, version("numba"), *((name, stat.st_mtime_ns, stat.st_size) for name, stat in stats)]
     )

@@ -14,7 +14,6 @@ from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import first_lateral_frequency
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.marches.friction import FrictionMarch
-from rubhpc.integrate.scheme import Scheme
 from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import with_keys
 from rubhpc.schema import DIVERGED, DONE
@@ -159,7 +158,6 @@ def test_ordinary_rub_is_that_of_steady_sliding(normal):
             simulate("mokhtar2017", **given, **method, friction_law=law) for law in ("sliding", "coulomb")
         )
         assert sliding.minimum_slip_speed.min() > 0.0
-        # Coulomb's law takes curved gaps in short steps, steady sliding by a scheme of order 4.
         share = 1e-9 if "method" in method or normal == "fixed" else 1e-4
         for name in ("vertical", "horizontal", "torsion", "stator_axial", "stator_lateral"):
             one, other = getattr(sliding, name), getattr(coulomb, name)
@@ -176,7 +174,7 @@ def test_modal_scheme_stays_in_closed_form_where_the_slip_turns():
     assert turned.energy_residual < 1e-6
 
 
-def stiff_rub(scheme, step):
+def stiff_rub():
     """The packaged rig with a stator of 30 GPa that slips, sticks and slips again, from rest."""
     rig = with_keys(read_rig("mokhtar2017"), {"stator.youngs_modulus": "30 GPa"})
     speed = 1.5 * first_lateral_frequency(assemble(rig))
@@ -184,17 +182,17 @@ def stiff_rub(scheme, step):
         rig,
         speed,
         contact=Contact(friction_law="coulomb"),
-        integrator=Integrator(step=step),
+        integrator=Integrator(),
         samples_per_revolution=64,
     )
     recording = Recording(transient=0, revolutions=2, samples_per_revolution=64)
-    record = run_case(replace(setup, scheme=scheme), clearance=60e-6, friction=0.6, recording=recording)
+    record = run_case(setup, clearance=60e-6, friction=0.6, recording=recording)
     return record, np.array([record.vertical, record.horizontal, record.torsion, *record.stator_lateral])
 
 
-def test_contacts_that_chatter_are_left_to_short_steps_for_a_millisecond(monkeypatch):
-    """A case that has had too many events when it first touches goes on in steps, then in closed form."""
-    exact, motion = stiff_rub(Scheme.EVENT_DRIVEN, None)
+def test_contacts_that_chatter_are_left_to_collocation_for_a_millisecond(monkeypatch):
+    """Too many events when a case first touches: it goes on by collocation, then in closed form."""
+    exact, motion = stiff_rub()
     kernel, is_done = FrictionMarch._kernel, []
 
     def exhausted(march, *args):
@@ -204,9 +202,9 @@ def test_contacts_that_chatter_are_left_to_short_steps_for_a_millisecond(monkeyp
         return kernel(march, *args)
 
     monkeypatch.setattr(FrictionMarch, "_kernel", exhausted)
-    stepped, other = stiff_rub(Scheme.EVENT_DRIVEN, 0.125e-6)
+    left, other = stiff_rub()
     assert exact.left_closed_form == 0
-    assert stepped.left_closed_form == 1
-    assert stepped.steps < 15_000  # 28 000 where a revolution is left to them
-    assert stepped.energy_residual < 1e-3
+    assert left.left_closed_form == 1
+    assert left.steps < 15_000
+    assert left.energy_residual < 1e-3
     assert abs(other - motion).max() < 1e-2 * abs(motion).max()

@@ -141,7 +141,7 @@ def test_random_machines_are_as_accurate_as_asked(seed):
     case = case | {"clearance_ratio": 0.7, "transient": 0, "revolutions": 4, "keep": ("waveform",)}
     record, exact = simulate(rig, **case), simulate(rig, **case, accuracy=1e-8)
     if record.scheme != exact.scheme:
-        pytest.skip("all modes leave closed form, and short steps are no reference")
+        pytest.skip("all modes leave closed form")
     errors, limit = errors_of(record, exact), 1e-3
     if max(errors.values()) > limit:  # as far as rounding moves it: a series of bounces ends otherwise
         moved = case | {"friction": case["friction"] * (1 + 1e-10)}

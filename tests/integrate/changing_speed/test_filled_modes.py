@@ -9,10 +9,8 @@ from calling import called
 from trial_rig import trial_rig
 
 from rubhpc.case_arguments import case_of, read_probes
-from rubhpc.integrate.changing_speed.range_curved import RangeCurvedLibrary
 from rubhpc.integrate.changing_speed.range_library import RangeLibrary, speeds_of
 from rubhpc.integrate.reduced_model.contact_mode import SlidingPairs, solve_contact_mode, stored_energy
-from rubhpc.integrate.reduced_model.curved_library import CurvedLibrary
 from rubhpc.integrate.reduced_model.friction_mode import mask_of, solve_friction_mode
 from rubhpc.integrate.reduced_model.mode_tables import energies_of, tabulate
 from rubhpc.integrate.reduced_model.reduction import directions
@@ -21,13 +19,11 @@ from rubhpc.integrate.reduced_model.touching import (
     open_bodies,
 )
 from rubhpc.kernels.contact_modes import enter
-from rubhpc.kernels.curved_levels import fill_level
 from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK, lifted_place
 from rubhpc.kernels.measuring import energies_gained
 
 energies_gained = called(energies_gained)
 enter = called(enter)
-fill_level = called(fill_level)
 
 
 def setup(q):
@@ -206,37 +202,3 @@ def test_energy_balances_while_the_unbalance_force_grows(growth):
             held.append(0.5 * (v @ v + u @ reduced.stiffness @ u))
         loss, work = gained + tables.steady_power[place] * time
         assert held[1] - held[0] == pytest.approx(work - loss, abs=1e-9 * max(abs(held[0]), abs(work)))
-
-
-@pytest.mark.parametrize("q", [1, 3])
-def test_tables_of_curved_gaps_are_those_at_that_speed(q):
-    base = setup(q)
-    phasor = (base.reduced.force[0] - 1j * base.reduced.force[1]) / base.spin**2
-    spin, tick = 231.0, 0.9 * base.tick
-    factor = (spin**2 - 40.0j) * np.exp(0.7j)
-    force = np.stack([(phasor * factor).real, -(phasor * factor).imag])
-    reduced = replace(base.reduced, spin=spin, force=force)
-    levels = {"known": {}, "sample_level": base.sample_level, "n_level": base.n_level}
-    case = base.model, 0.2
-    library = RangeCurvedLibrary(
-        base.reduced, *case, phasor=phasor, at_piece=lambda: reduced, tick=base.tick, **levels
-    )
-    for mask in Sliding.masks[q]:
-        library.add(mask)
-    library.tune(speeds_of([spin], [factor], [0.0], [tick], base.spin, base.sample_level), 0)
-    opened = solve_contact_mode(reduced, library.gap_jacobian, library.force_direction, 0)
-    anew = CurvedLibrary(reduced, *case, opened=opened, tick=tick, **levels)
-    for mask in Sliding.masks[q]:
-        library.add(mask)
-        if mask not in anew.masks:
-            anew.add(mask)
-        found, expected = library.curved_tables(), anew.curved_tables()
-        place, there = library.masks.index(mask), anew.masks.index(mask)
-        for level in range(min(found.is_filled.shape[1], expected.is_filled.shape[1])):
-            fill_level(found, place, level, tick * 2.0**level)
-            fill_level(expected, there, level, tick * 2.0**level)
-        for name in set(expected._fields) - {"is_filled"}:
-            values, table = getattr(found, name)[place], getattr(expected, name)[there]
-            common = tuple(map(slice, np.minimum(values.shape, table.shape)))  # levels are those of the tick
-            largest = np.abs(table).max(initial=0.0)
-            assert np.abs(values[common] - table[common]).max(initial=0.0) <= 1e-9 * largest, name

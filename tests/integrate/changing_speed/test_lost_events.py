@@ -1,4 +1,4 @@
-"""Events of run-ups: contacts that share the shaft come to rest; missed events are taken in short steps."""
+"""Events of run-ups: contacts that share the shaft come to rest; missed events are left to collocation."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ def test_an_open_pair_that_overlaps_has_missed_an_event(overlap):
 def test_masses_that_carry_a_shaft_come_to_rest_as_the_speed_falls(
     monkeypatch, friction_law, friction, largest
 ):
-    """No event needs short steps; masses threw each other or themselves open for ever, and one was lost."""
+    """Nothing is left to collocation; masses threw each other or themselves open for ever."""
     pump = Rotor(
         shaft=(
             ShaftSection(
@@ -65,10 +65,10 @@ def test_masses_that_carry_a_shaft_come_to_rest_as_the_speed_falls(
         )
         for k in range(8)
     )
-    stepped = []
-    short = passing.ContactSteppingMarch
+    left = []
+    collocation = passing.CollocationMarch
     for march in (passing, friction_march):
-        monkeypatch.setattr(march, "ContactSteppingMarch", lambda *given: stepped.append(1) or short(*given))
+        monkeypatch.setattr(march, "CollocationMarch", lambda *given: left.append(1) or collocation(*given))
     found = run_up(
         Rig(name="pump", rotor=pump, stator=ring),
         speed_law=[(0.0, "2500 rpm"), (3.0, "5500 rpm"), (4.0, "5500 rpm"), (7.0, "2500 rpm")],
@@ -77,5 +77,5 @@ def test_masses_that_carry_a_shaft_come_to_rest_as_the_speed_falls(
         friction_law=friction_law,
         samples_per_revolution=128,
     )
-    assert not stepped
+    assert not left
     assert np.hypot(found.vertical, found.horizontal).max() == pytest.approx(largest, rel=1e-3)

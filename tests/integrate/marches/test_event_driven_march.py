@@ -142,22 +142,21 @@ def test_endless_events_are_those_of_a_revolution(monkeypatch, since, left):
 
 
 @pytest.mark.parametrize("too_many", ["sets", "events"])
-def test_endless_events_are_left_to_short_steps(monkeypatch, too_many):
-    """More sets of contacts, or more events, than allowed: the case is done in steps, to the same answer."""
+def test_endless_events_are_left_to_collocation(monkeypatch, too_many):
+    """More sets of contacts, or more events, than allowed: collocation takes the case, to the same answer."""
     exact = simulate(trial_rig(3), **CLOSE)
     if too_many == "sets":
         monkeypatch.setattr(ModeLibrary, "_most_modes", 4)
         monkeypatch.setattr(met_modes, "MOST_REFILLS", 1)
     else:
         monkeypatch.setattr(event_driven_march, "advance", lambda *_: CONTACT_UNSOLVED)
-    stepped = simulate(trial_rig(3), step="0.25 us", **CLOSE)
-    assert stepped.status == DONE
+    left = simulate(trial_rig(3), **CLOSE)
+    assert left.status == DONE
     assert (SCHEMES[exact.scheme], exact.left_closed_form) == ("event_driven", 0)
-    assert (SCHEMES[stepped.scheme], stepped.left_closed_form) == ("contact_stepping", 1)
-    assert stepped.steps > 10 * exact.steps
-    check_close(stepped, exact, 1e-3)  # first order in the step
-    assert stepped.contact_impulse == pytest.approx(exact.contact_impulse, rel=2e-3)
-    assert stepped.contacts_per_revolution == pytest.approx(exact.contacts_per_revolution, abs=0.51)
+    assert (SCHEMES[left.scheme], left.left_closed_form) == ("collocation", 1)
+    check_close(left, exact, 1e-3)
+    assert left.contact_impulse == pytest.approx(exact.contact_impulse, rel=2e-3)
+    assert left.contacts_per_revolution == pytest.approx(exact.contacts_per_revolution, abs=0.51)
 
 
 @pytest.mark.parametrize("spin", [SPEED, -SPEED])

@@ -71,7 +71,7 @@ def test_case_that_diverges_ends_in_the_same_revolution():
     assert together.sample == (n + 1 - N) * RECORDING.samples_per_revolution
 
 
-def test_revolution_in_short_steps_stands_among_the_others(monkeypatch):
+def test_revolution_by_collocation_stands_among_the_others(monkeypatch):
     """A case that leaves closed form for a revolution in the first one goes on to the same number of them."""
     exact, left = march_of({"friction_law": "coulomb"}), march_of({"friction_law": "coulomb"})
     idle = idle_of(exact)

@@ -13,7 +13,7 @@ from scipy.optimize import fsolve
 from rubhpc import LumpedStator, Rig, State, Unbalance
 from rubhpc.integrate.lyapunov import N_ALIGNING, Growth, Marches
 from rubhpc.integrate.marches.central_difference import CentralDifferenceMarch
-from rubhpc.integrate.marches.contact_stepping import ContactSteppingMarch
+from rubhpc.integrate.marches.collocation import CollocationMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.setup import prepare
 from rubhpc.integrate.tangent_motion import TangentMotion
@@ -22,7 +22,7 @@ from rubhpc.study.study import Integrator, Recording
 
 MARCHES = {
     "modal": EventDrivenMarch,
-    "stepped": ContactSteppingMarch,
+    "collocation": CollocationMarch,
     "central-difference": CentralDifferenceMarch,
 }
 
@@ -110,7 +110,7 @@ def test_impacts_take_their_share_of_the_phase_space():
 
 
 def test_every_integrator_finds_one_exponent():
-    """Period 1 of the packaged rig: 0.529 per revolution, in steps of 2 us where steps are taken.
+    """Period 1 of the packaged rig: 0.529 per revolution, the central difference in steps of 2 us.
 
     Complex multipliers: the growth goes up and down with the angle of the displacement.
     """
@@ -121,7 +121,7 @@ def test_every_integrator_finds_one_exponent():
         name: growth_of(read_rig("mokhtar2017"), given, record.final, 14, march)
         for name, march in MARCHES.items()
     }
-    for name in ("stepped", "central-difference"):
+    for name in ("collocation", "central-difference"):
         assert found[name].mean() == pytest.approx(found["modal"].mean(), rel=0.01), name
 
 
