@@ -13,29 +13,11 @@ from rubhpc import simulate
 from rubhpc.rig.reading import with_keys
 
 ACCURACY = 1e-3
-SUPPORTED = (
-    "linear, sliding",
-    "linear, stick",
-    "linear, penalty",
-    "updated, sliding",
-    "bent, fixed",
-    "bent, sliding",
-    "bent, fast",
-    "bent, restitution",
-    "updated, penalty",
-    "updated, stribeck",
-    "three masses, penalty",
-    "four masses",
-    "four masses, stick",
-    "four masses, restitution",
-    "eight masses",
-    "wall",
-    "overhung",
-    "carrier",
-)
+ALLOWED = 2.0  # errors over the accuracy
+SHARE = 2e-4  # of the time, in which a pair may stick or touch more or less
 
 
-@pytest.mark.parametrize("name", SUPPORTED)
+@pytest.mark.parametrize("name", CASES)
 def test_case_is_that_of_the_independent_code(name):
     """Signals by their rms; what the independent code itself has of error is allowed."""
     rig, case = case_of(name)
@@ -43,11 +25,11 @@ def test_case_is_that_of_the_independent_code(name):
     error = dict(zip(SIGNALS + MEASURES, known["error"], strict=True))
     for of in SIGNALS:
         found, expected = np.atleast_2d(getattr(record, of)), np.atleast_2d(known[of])
-        most = max(ACCURACY, error[of]) * math.sqrt(np.mean(expected**2))
+        most = max(ALLOWED * ACCURACY, error[of]) * math.sqrt(np.mean(expected**2))
         assert math.sqrt(np.mean((found - expected) ** 2)) <= most, of
     for of in MEASURES:
-        most = max(ACCURACY, error[of]) * known[of].max()
-        assert getattr(record, of) == pytest.approx(known[of], rel=0, abs=most + 1e-5), of
+        most = max(ALLOWED * ACCURACY, error[of]) * known[of].max()
+        assert getattr(record, of) == pytest.approx(known[of], rel=0, abs=most + SHARE * of.endswith("_fraction")), of
 
 
 def lone_mass(mass=1.0, **case):

@@ -30,6 +30,7 @@ Ints = NDArray[np.int64]
 N_LOOK = 16  # parts of a step in which a root is looked for
 MOST_HALVINGS = 60
 NO_ROOT = 2.0
+BREAKING = 0.3  # of the accuracy: friction beyond its bound, of the error of T, at which a pair breaks away
 STILL = 1e-9  # m/s, slip that rounding leaves where a pair begins to slide
 
 
@@ -106,7 +107,7 @@ def fill_events(
             if not bodies.is_sticky:
                 continue
             if state[i] == STICKING:  # breaks away beyond the error of T: else stick and slip would alternate
-                bound = (1.0 + 3.0 * accuracy) * static_friction(bodies, i) * force[i, NORMAL, k]
+                bound = (1.0 + BREAKING * accuracy) * static_friction(bodies, i) * force[i, NORMAL, k]
                 event[i, FRICTION, k] = bound - abs(force[i, FRICTION, k])
             else:
                 event[i, FRICTION, k] = state[i] * solution.seen[row, SLIP] + STILL

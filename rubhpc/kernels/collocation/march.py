@@ -538,6 +538,9 @@ def advance_by_collocation(
                     return CONTACT_UNSOLVED
             fill_events(bodies, nodes, state, solution.guess, accuracy, solution)
             place, pair, kind = first_event(bodies, nodes, state, solution)
+            if pair >= 0 and memory.length == 0 and slot > 0:  # so soon after another event
+                memory.slot = slot - 1
+                continue
             whole = 1 << (tables.first_level + slot)
             taken = whole
             if place <= 1.0:

@@ -8,6 +8,7 @@ import pytest
 from closed_form import read_rig, simulate
 from independent_contact import run
 from record_distance import MOTIONS
+from reference_bodies import squared_slope
 from trial_rig import trial_rig
 
 from rubhpc import InputError
