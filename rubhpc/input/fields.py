@@ -327,8 +327,8 @@ def quantity(
         Whether rigs of older stores have no such key.
     """
     limits = {"above": above, "at_least": at_least, "below": below, "or_words": or_words, "added": added}
-    limits |= {"or_unit": or_unit} if or_unit else {}
-    return _declare("quantity", doc, example, default, unit=unit, **limits)
+    other = {"or_unit": or_unit} if or_unit else {}
+    return _declare("quantity", doc, example, default, unit=unit, **limits, **other)
 
 
 def series(

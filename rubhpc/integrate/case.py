@@ -43,6 +43,7 @@ from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.periodic_motions.collocated_motion import followed_motion
 from rubhpc.integrate.periodic_motions.direct import pass_directly
 from rubhpc.integrate.periodic_motions.lyapunov_spectrum import spectrum_of
+from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.periodic_motions.proof import Solver
 from rubhpc.integrate.periodic_motions.solved_motion import SolvedMotion, solved_motions
 from rubhpc.integrate.record import Record, State
@@ -68,7 +69,6 @@ if TYPE_CHECKING:
     from rubhpc.integrate.measuring.measures import Judge
     from rubhpc.integrate.measuring.regimes import Verdict
     from rubhpc.integrate.periodic_motions.collocated_motion import CollocatedMotion
-    from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
     from rubhpc.integrate.setup import Setup
     from rubhpc.kernels.accumulators import Samples
     from rubhpc.kernels.trail import Trail
@@ -219,7 +219,8 @@ def _integrate(
     begin = partial(followed_motion(setup), cast("ModalSetup", setup), clearance, friction)
     if recording.is_transient_direct and isinstance(march, EventDrivenMarch):
         motions = solved_motions(march.setup, (clearance, friction, recording))
-        march, reason, n_transient, n_step, motion = pass_directly(march, begin, recording, motions)
+        followed = partial(PiecewiseMotion, march.setup, clearance, friction)
+        march, reason, n_transient, n_step, motion = pass_directly(march, followed, recording, motions)
         if motion is not None and motion.record is not None:
             record, n_own_step, n_own_left = motion.record
             return _counted(record.copied(), n_transient, n_step + n_own_step, march.n_left + n_own_left)

@@ -15,7 +15,6 @@ from rubhpc.integrate.case import march_of, run_case
 from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.periodic_motions.collocated_motion import CollocatedMotion, followed_motion
-from rubhpc.integrate.periodic_motions.piecewise_motion import Change, PiecewiseMotion
 from rubhpc.integrate.periodic_motions.revolution import least_of
 from rubhpc.integrate.periodic_motions.shooting import NotConverged, Orbit, shoot
 from rubhpc.integrate.record import Record, State
@@ -25,6 +24,7 @@ from rubhpc.schema import REGIME
 from rubhpc.spectra import amplitude_spectrum
 
 if TYPE_CHECKING:
+    from rubhpc.integrate.periodic_motions.piecewise_motion import Change, PiecewiseMotion
     from rubhpc.integrate.setup import Setup
     from rubhpc.study.initial import Initial
     from rubhpc.study.tables import Recording

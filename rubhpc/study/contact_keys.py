@@ -177,10 +177,10 @@ class Contact(ContactKeys):
                 if getattr(self, kind) == law and getattr(self, key) is None:
                     raise FieldError(key, f'missing; {kind} = "{law}" needs one, such as {key} = {example}')
         for key, units in UNITS.items():
-            given, needed = getattr(self, key), units[self.law == "hertz"]
+            given, unit = getattr(self, key), units[self.law == "hertz"]
             if isinstance(given, WithUnit):
-                if given.unit != needed:
-                    raise FieldError(key, f'{given:g} {given.unit}: law = "{self.law}" needs one in {needed}')
+                if given.unit != unit:
+                    raise FieldError(key, f'{given:g} {given.unit}: law = "{self.law}" needs one in {unit}')
                 object.__setattr__(self, key, float(given))
         if self.restitution is not None and self.restitution > 1:
             raise FieldError("restitution", f"{self.restitution:g} is out of range; it must be at most 1")

@@ -29,7 +29,8 @@ def test_case_is_that_of_the_independent_code(name):
         assert math.sqrt(np.mean((found - expected) ** 2)) <= most, of
     for of in MEASURES:
         most = max(ALLOWED * ACCURACY, error[of]) * known[of].max()
-        assert getattr(record, of) == pytest.approx(known[of], rel=0, abs=most + SHARE * of.endswith("_fraction")), of
+        most += SHARE * of.endswith("_fraction")
+        assert getattr(record, of) == pytest.approx(known[of], rel=0, abs=most), of
 
 
 def lone_mass(mass=1.0, **case):

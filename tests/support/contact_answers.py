@@ -76,10 +76,6 @@ CASES = {
     "bent, coulomb, backward": (BENT, UPDATED | COULOMB | {"speed_ratio": -1.2}),
     "bent, fixed, stick": (SLIM, COULOMB | HIGH),
     "bent, stick": (SLIM, UPDATED | STICK | HIGH),
-    "bent, stick at low speed": (
-        with_keys(BENT, WEIGHT | {"stator.radius": 0.001, "stator.angle": math.pi}),
-        UPDATED | COULOMB | {"static_friction_ratio": 2.0, "friction": 0.2, "speed_ratio": 0.4},
-    ),
     "bent, stick at high speed": (
         with_keys(BENT, {"stator.radius": 0.001, "stator.youngs_modulus": 30e9}),
         UPDATED | COULOMB | HIGH | {"speed_ratio": 1.2},

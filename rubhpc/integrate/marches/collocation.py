@@ -50,9 +50,9 @@ class CollocationMarch(ModalMarch):
         super().__init__(setup, clearance, friction, initial, check)
         self._friction = friction
         self._seen: Seen | None = None
+        self._sizes: tuple[object, ...] = ()
         self.accuracy = setup.accuracy
         self.trail: Trail | None = None  # of tangent and events, where one is kept
-        self._solution: Solution | None = None
         self._use_modes(setup)
         self._begin(initial.contact_force)
 
@@ -61,11 +61,11 @@ class CollocationMarch(ModalMarch):
         self._modes = setup.flight_modes
         self._contacts = self._modes.bodies(self._friction, self._clearance)
         sizes = self._modes.tables.free.shape, self._modes.n_local
-        if self._solution is None or sizes != self._sizes:
+        if sizes != self._sizes:
             self._sizes, self._solution, self._seen = sizes, self._new_solution(), None
 
     def _begin(self, contact_force: Floats, turn: tuple[float, float] = (1.0, 0.0)) -> None:
-        """Begin with the motion, at the shaft's `turn`; the contacts that forces (q,), N, press are closed."""
+        """Begin with the motion, at the shaft's `turn`; contacts are closed that forces (q,), N, press."""
         modes, s, q = self._modes, self._modes.nodes.at.size, self._clearance.size
         self._memory = new_memory()
         self._case = CaseState(
@@ -121,7 +121,7 @@ class CollocationMarch(ModalMarch):
     def carry(
         self, last_tick: int, columns: Floats, n_event: int, accuracy: float | None = None
     ) -> tuple[int, Trail]:
-        """Go on to a tick with the tangent columns (nx, k) and events; an outcome of the kernel, and the trail."""
+        """Go on to a tick with tangent columns (nx, k) and events: outcome of the kernel, and the trail."""
         own, self.accuracy = self.accuracy, accuracy or self.accuracy
         trail = self.new_trail(columns, n_event)
         self.trail, (samples, accumulator) = trail, self._idle
@@ -184,7 +184,7 @@ class CollocationMarch(ModalMarch):
         motion: Floats,
         closed: NDArray[np.bool_],
     ) -> None:
-        """Begin at the tick of another march with its motion (2 n,) and closed pairs (q,); continue its record."""
+        """Continue the record of another march at its tick, with its motion (2 n,) and closed pairs (q,)."""
         self.clock, self._recorder = clock, recorder
         follow(self.progress, progress)
         self._motion[:] = motion
@@ -204,7 +204,8 @@ class CollocationMarch(ModalMarch):
 
     def touching(self) -> NDArray[np.bool_]:
         """Whether each pair is closed, (q,)."""
-        return self._case.state != OPEN
+        is_closed: NDArray[np.bool_] = self._case.state != OPEN
+        return is_closed
 
     def _contact_force(self) -> Floats:
         force = self._modes.nodes.power.T @ self._case.force[:, NORMAL].T  # powers

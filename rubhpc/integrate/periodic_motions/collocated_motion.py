@@ -24,7 +24,7 @@ from rubhpc.kernels.collocation.structures import NORMAL, OPEN, STICKING
 from rubhpc.kernels.collocation.tangent import AFTER, BEFORE, FULL, KIND, N_EVENT, PAIR
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.record import State
@@ -38,7 +38,7 @@ ACCURACY = 1e-4  # of forces, at most: periodic motions close to about a hundred
 STATE_BITS = 2  # of a pair in the number of all states
 
 
-def followed_motion(setup: Setup) -> type[PiecewiseMotion | CollocatedMotion]:
+def followed_motion(setup: Setup) -> Callable[..., PiecewiseMotion | CollocatedMotion]:
     """Return what follows the motions of a set-up: in closed form, or by collocation."""
     return CollocatedMotion if setup.scheme is Scheme.COLLOCATION else PiecewiseMotion
 
@@ -73,7 +73,7 @@ class CollocatedRevolution:
 
 
 class CollocatedMotion:
-    """Follows motions of one case from the shaft's angle 0, as `PiecewiseMotion` does where it has a closed form.
+    """Follows motions of one case from the shaft's angle 0, as `PiecewiseMotion` does in closed form.
 
     Attributes
     ----------
@@ -201,7 +201,9 @@ class CollocatedMotion:
         """Motion and states after a revolution, and what small changes (2 n, k) of the beginning become."""
         march = self.march
         march.place_at(motion, states_of(states, self.q), 0)
-        trail = self._carry(march.clock.samples_per_revolution << march.clock.sample_level, columns, MOST_EVENTS)
+        trail = self._carry(
+            march.clock.samples_per_revolution << march.clock.sample_level, columns, MOST_EVENTS
+        )
         return march.motion(), code_of(march.states), march.modes.motion @ trail.columns
 
     def _carry(self, tick: int, columns: Floats, most_events: int) -> Trail:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -91,7 +91,7 @@ class Orbit:
 
     motion: Floats
     states: int
-    revolutions: tuple[Revolution, ...] | tuple[CollocatedRevolution, ...]
+    revolutions: tuple[Any, ...]
     monodromy: Floats
     residual: float
     iterations: int

@@ -53,12 +53,13 @@ class Search:
         """Take Newton steps, or shares of them; returns why the motion does not close, or ""."""
         while self.residual > CONVERGED:
             if self.iterations == most_iterations:
-                return "" if self.residual <= CLOSED else f"no convergence within {most_iterations} iterations"
+                return (
+                    "" if self.residual <= CLOSED else f"no convergence within {most_iterations} iterations"
+                )
             self.iterations += 1
-            if self._matrix is None:
-                self._find_derivative()
+            matrix = self._find_derivative() if self._matrix is None else self._matrix
             before, defect = self.residual, self.revolutions[-1].end - self.motion
-            step = np.linalg.lstsq(self._matrix, defect, rcond=1e-12)[0]
+            step = np.linalg.lstsq(matrix, defect, rcond=1e-12)[0].astype(float)
             is_better = self._improve(step, least_step)
             if not is_better and self._differs == 0.0:
                 return "" if self.residual <= CLOSED else "Newton's method stalls"
@@ -82,10 +83,11 @@ class Search:
                 return d
         return self._period
 
-    def _find_derivative(self) -> None:
+    def _find_derivative(self) -> Floats:
         self.revolutions = self._follow(self.motion, self.states, has_derivative=True)
         self._derivatives = [revolution.derivative for revolution in self.revolutions]
         self._matrix, self._differs = np.eye(self.motion.size) - self.monodromy(self._period), 0.0
+        return self._matrix
 
     def monodromy(self, period: int) -> Floats:
         """Derivative (2 n, 2 n) of the motion after a period by the beginning."""
@@ -117,4 +119,6 @@ class Search:
         )
 
     def _residual(self, motion: Floats, revolutions: list[CollocatedRevolution]) -> float:
-        return self._case.size(revolutions[-1].end - motion) / max(self._case.size(motion), np.finfo(float).tiny)
+        return self._case.size(revolutions[-1].end - motion) / max(
+            self._case.size(motion), np.finfo(float).tiny
+        )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model, StatorModel
-    from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
+    from rubhpc.kernels.laws import Law
 
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
@@ -46,6 +46,46 @@ RESTING = 1e-9  # of the largest exponent: smaller sums of two exponents count a
 ENOUGH = 0.3  # of the accuracy: share of the foreshortening that may be missed
 UNBENT = 1e-8  # bending displacement over the largest of a stator; smaller ones count as zero
 UNSEEN = 1e-14  # of the largest: eigenvalues of damping and skew stiffness that are rounding
+
+
+class Settings(Protocol):
+    """What a `modal_setup.ModalSetup` has."""
+
+    @property
+    def model(self) -> Model:
+        """The model."""
+
+    @property
+    def reduced(self) -> ReducedModel:
+        """The same in reduced coordinates."""
+
+    @property
+    def law(self) -> Law:
+        """Laws of contact and friction."""
+
+    @property
+    def is_updated(self) -> bool:
+        """Whether the normal follows the line of centres."""
+
+    @property
+    def spin(self) -> float:
+        """Speed, rad/s."""
+
+    @property
+    def accuracy(self) -> float:
+        """Accuracy asked for."""
+
+    @property
+    def displacement_limit(self) -> float:
+        """Displacement beyond which a motion has diverged, m."""
+
+    @property
+    def tick(self) -> float:
+        """Resolution of events, s."""
+
+    @property
+    def n_level(self) -> int:
+        """Levels for which exponentials are tabulated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +107,7 @@ class FlightModes:
         Motion under it.
     """
 
-    setup: ModalSetup
+    setup: Settings
     eigenvalue: Complexes
     eigenmotion: Complexes
     entry: Complexes
@@ -215,7 +255,8 @@ class FlightModes:
     def power(self) -> Complexes:
         """Exponentials of the modes over 2^level ticks (n_level, nm)."""
         level = np.arange(self.setup.n_level)
-        return np.exp(np.outer(self.setup.tick * 2.0**level, self.exponent))
+        power: Complexes = np.exp(np.outer(self.setup.tick * 2.0**level, self.exponent))
+        return power
 
     @cached_property
     def signals(self) -> Signals:
@@ -287,7 +328,7 @@ def energy_forms(
     sign: Floats,
     n_loss: int,
 ) -> tuple[Floats, Floats]:
-    """Quadratic forms of the coordinates whose growth in free motion is a work, and those it grows by in time.
+    """Quadratic forms of the coordinates whose growth in flight is a work, and those that grow in time.
 
     A power `x' P x` of modes with the exponents a and b has the primitive `P_ab / (a + b)`; where the sum is
     zero it is constant.

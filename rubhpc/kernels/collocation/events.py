@@ -81,7 +81,7 @@ def root_between(
 def fill_events(
     bodies: Bodies, nodes: Nodes, state: Ints, force: Floats, accuracy: float, solution: Solution
 ) -> None:
-    """Fill the event functions (q, 2, s) at the nodes: positive while a pair keeps its state; unused ones 1."""
+    """Fill the event functions (q, 2, s) at the nodes, positive while a pair keeps its state; 1: unused."""
     s, n_local, n_row, event = nodes.at.size, bodies.n_local, bodies.load.shape[0], solution.event
     for i in range(state.size):
         first = i * n_local

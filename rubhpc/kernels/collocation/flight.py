@@ -9,7 +9,11 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.collocation.gaps import see_gap
-from rubhpc.kernels.collocation.structures import Bodies, CaseState, Solution
+from rubhpc.kernels.collocation.structures import (  # noqa: TC001 - part of a kernel's signature
+    Bodies,
+    CaseState,
+    Solution,
+)
 from rubhpc.kernels.collocation.tables import turn_freely
 from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.cubics import turning_value

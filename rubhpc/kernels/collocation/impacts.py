@@ -126,8 +126,8 @@ def find_impulses(
     """Impulses of the pairs in `touching` at the local motions `start`, into `solution.impulse`.
 
     Newton's restitution for approaches faster than `least` (m/s), and Coulomb's cone, or steady sliding: by
-    Gauss and Seidel's method over the pairs. Pairs in `kept` were closed before: their gap rates are rounding;
-    those in `bound` stay closed, by an impulse that may pull.
+    Gauss and Seidel's method over the pairs. Pairs in `kept` were closed before: their gap rates are
+    rounding; those in `bound` stay closed, by an impulse that may pull.
     """
     q, speed, impulse = touching.size, solution.speed, solution.impulse
     normal, tangent = solution.normal, solution.tangent
@@ -191,9 +191,9 @@ def impulse_of(
 
 @linked_sum
 def is_jammed(bodies: Bodies, s: int, i: int, state: int, solution: Solution) -> bool:
-    """Whether a force would press the gap of a sliding pair closed (Painleve): no force then obeys the laws."""
+    """Whether forces press the gap of a sliding pair further closed: none obeys the laws (Painleve)."""
     row = i * s
-    if state == STICKING or state == OPEN or bodies.normal_law[i] != LAGRANGE:
+    if state in (STICKING, OPEN) or bodies.normal_law[i] != LAGRANGE:
         return False
     ratio = state * friction_ratio(bodies, i, solution.seen[row, SLIP])[0]
     along = coupling(bodies, solution.normal, row, i, solution.normal, row, i)

@@ -130,7 +130,7 @@ def hold_forces(force: Floats, guess: Floats) -> None:
 def error_of(
     nodes: Nodes, state: Ints, before: Floats, guess: Floats, is_continued: bool, noise: float
 ) -> float:
-    """Estimated error of the forces of a step, N: by their last coefficients and the jump from the last step."""
+    """Estimated error of the forces of a step, N: by their last coefficients, and the jump between steps."""
     s, error = nodes.at.size, 0.0
     for i in range(state.size):
         if state[i] == OPEN:
@@ -148,10 +148,10 @@ def error_of(
 @linked_sum
 def any_closed(state: Ints) -> bool:
     """Whether a pair is closed."""
+    is_any = False
     for i in range(state.size):
-        if state[i] != OPEN:
-            return True
-    return False
+        is_any = is_any or state[i] != OPEN
+    return is_any
 
 
 @linked_sum
@@ -199,22 +199,21 @@ def take_event(
             memory.scale = LEAST_SCALE
         if is_recorded:
             seen.measured.accumulator.n_contact[pair] += 1
-        if bodies.normal_law[pair] == LAGRANGE:
-            if not strike(
-                bodies,
-                nodes,
-                clock,
-                pair,
-                acceleration,
-                is_recorded,
-                accuracy,
-                progress,
-                memory,
-                case,
-                solution,
-                seen,
-            ):
-                return False
+        if bodies.normal_law[pair] == LAGRANGE and not strike(
+            bodies,
+            nodes,
+            clock,
+            pair,
+            acceleration,
+            is_recorded,
+            accuracy,
+            progress,
+            memory,
+            case,
+            solution,
+            seen,
+        ):
+            return False
         memory.slot = lowest
         if case.lasting[pair] > 0.0:
             memory.slot = slot_within(tables, BEGINNING * case.lasting[pair])
@@ -470,7 +469,9 @@ def advance_by_collocation(
                     slot -= 1
                 if memory.length > 0:
                     ratio = (1 << (tables.first_level + slot)) / memory.length
-                    continue_forces(nodes, memory.part, ratio, state, case.force, solution.weight, solution.guess)
+                    continue_forces(
+                        nodes, memory.part, ratio, state, case.force, solution.weight, solution.guess
+                    )
                 else:
                     solution.guess[:] = case.force
             if not tables.is_filled[slot]:
@@ -639,13 +640,13 @@ def advance_by_collocation(
         ):
             return CONTACT_UNSOLVED
         todo, trial = TRYING, -1
-    if is_recorded and progress.tick == clock.n_sample << clock.sample_level:
-        if progress.tick == progress.next_sample << clock.sample_level:
-            see_start(bodies, x, solution)
-            if not find_forces(bodies, s, state, solution, solution.instant):
-                return CONTACT_UNSOLVED
-            fill_instant_load(bodies, s, solution)
-            record_instant(bodies, signals, clock, case.force, x, progress, seen, solution.begun)
+    is_last = progress.tick == clock.n_sample << clock.sample_level
+    if is_recorded and is_last and progress.tick == progress.next_sample << clock.sample_level:
+        see_start(bodies, x, solution)
+        if not find_forces(bodies, s, state, solution, solution.instant):
+            return CONTACT_UNSOLVED
+        fill_instant_load(bodies, s, solution)
+        record_instant(bodies, signals, clock, case.force, x, progress, seen, solution.begun)
     return FINISHED
 
 

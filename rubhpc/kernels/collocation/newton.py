@@ -644,8 +644,8 @@ def take_step(
     """Solve a step from the coordinates x: `force` (q, 2, s), a guess, becomes the solution.
 
     Returns the number of iterations, negative where they do not converge. `tolerance` is that of forces, N.
-    Where it is not `is_whole`, velocities at the nodes between may be left out; where `is_exact`, the matrix is
-    that at the solution, for the tangent.
+    Where it is not `is_whole`, velocities at the nodes between may be left out; where `is_exact`, the matrix
+    is that at the solution, for the tangent.
     """
     s, n_local, n_row = nodes.at.size, bodies.n_local, bodies.load.shape[0]
     n_y = (2 * s - 1) * n_row

@@ -19,7 +19,7 @@ from rubhpc.kernels.accumulators import (
     observe_rub,
     observe_sense,
 )
-from rubhpc.kernels.case_progress import Clock, Progress
+from rubhpc.kernels.case_progress import Clock, Progress  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.collocation.structures import (
     BACKWARD,
     FORWARD,
@@ -66,7 +66,8 @@ class Signals(Struct):
     gained: Floats  # (2, nx, nx), quadratic forms whose growth is loss, work, J
     drift: Floats  # (2, nx, nx), quadratic forms that grow with the time, W
     is_filled: NDArray[np.bool_]  # (k,)
-    free: Floats  # (k, n, nx), values of smooth rows at the nodes after the first, rates at the end; rough; powers
+    # (k, n, nx): smooth rows, rough ones and powers, node by node after the first; then rates at the end
+    free: Floats
     forced: Floats  # (k, s R, n)
 
 

@@ -10,16 +10,13 @@ whose squares add up to twice the foreshortening of a beam. The local motions of
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.laws import Law  # noqa: TC001 - part of a kernel's signature
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -187,17 +184,20 @@ def _lobatto(s: int) -> Floats:
 def lobatto_nodes(s: int) -> Nodes:
     """Polynomials on s nodes."""
     at, order = _lobatto(s), np.arange(s)
-    power = np.linalg.inv(np.vander(at, increasing=True)).T.copy()
-    from_power: Callable[..., Floats] = np.polynomial.polynomial.polyval
-    comb = np.array([[math.comb(i, m) / math.comb(s - 1, m) for m in order] for i in order])
+    power: Floats = np.linalg.inv(np.vander(at, increasing=True)).T.astype(float)
+    comb = np.array(
+        [[math.comb(i, m) / math.comb(s - 1, m) if m <= i else 0.0 for m in order] for i in order]
+    )
     values = np.vander(at, s + 2, increasing=True)
     slopes = np.array([np.eye(s + 2)[1], np.arange(s + 2.0)])
+    legendre: Floats = np.linalg.inv(np.polynomial.legendre.legvander(2.0 * at - 1.0, s - 1)).astype(float)
+    integral = (at[:, None] ** (order + 1) / (order + 1)) @ power.T
     return Nodes(
         at=at,
-        power=power,
-        integral=np.array([from_power(at, np.r_[0.0, row / (order + 1)]) for row in power]).T.copy(),
+        power=np.ascontiguousarray(power),
+        integral=integral,
         end_slope=power @ order.astype(float),
-        legendre=np.linalg.inv(np.polynomial.legendre.legvander(2.0 * at - 1.0, s - 1)).copy(),
+        legendre=np.ascontiguousarray(legendre),
         bernstein=comb @ power.T,
         hermite=np.linalg.inv(np.vstack([values, slopes])),
     )

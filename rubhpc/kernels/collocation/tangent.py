@@ -314,7 +314,7 @@ def margin_change(bodies: Bodies, s: int, pair: int, size: float, solution: Solu
 
 @linked_sum
 def fill_kicks(bodies: Bodies, s: int, least: float, solution: Solution, trail: Trail) -> None:
-    """Fill `trail.kick` by central differences of the impulses in the local motions and velocities `start`."""
+    """Fill `trail.kick` by differences of the impulses in the local motions and velocities `start`."""
     n_local, n_row, start, kick = bodies.n_local, bodies.load.shape[0], solution.start, trail.kick
     fastest = 1e-30
     for r in range(n_row):
