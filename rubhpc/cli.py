@@ -43,6 +43,7 @@ COMMANDS = {
     "report": ("rubhpc.commands.report:report", "One HTML page: maps, and every case behind them."),
     "view": ("rubhpc.commands.report:view", "The same for a large store, served to this machine only."),
     "export": ("rubhpc.commands.export:export", "Cases as one file: HDF5, CSV or Parquet."),
+    "dataset": ("rubhpc.commands.dataset:dataset", "Labelled windows through sensors, for machine learning."),
     "claims": ("rubhpc.commands.claims:claims", "The paper's claims against the stores of jobs/paper."),
 }
 
@@ -150,7 +151,7 @@ def _code_of(args: list[str]) -> int:
 
 def _evaluates_store(args: list[str]) -> bool:
     """Whether a command draws or writes what a store says, which may come from anybody and say anything."""
-    return not {"reduce", "report", "view", "export", *figures()}.isdisjoint(args[:1])
+    return not {"reduce", "report", "view", "export", "dataset", *figures()}.isdisjoint(args[:1])
 
 
 def _prints_results(args: list[str]) -> bool:

@@ -118,7 +118,7 @@ def indicator_scores(
             f"{source(store)}: {n} samples a revolution do not resolve the stator's vibration at the lowest "
             f"speed; use at least {least}, or select faster cases"
         )
-    reference = [float(_rms(data[name]).where(rub).median()) for name in CHANNELS]
+    reference = [float(rms_about_mean(data[name]).where(rub).median()) for name in CHANNELS]
     waves = [data[name] for name in CHANNELS]
     if "stator" not in data.dims:
         waves[-1] = waves[-1].expand_dims("stator")
@@ -174,8 +174,8 @@ def _natural(data: xr.Dataset) -> dict[str, xr.DataArray]:
     return {"torsion": rotor["torsional"], "stator": stator}
 
 
-def _rms(wave: xr.DataArray) -> xr.DataArray:
-    """Return the rms of a signal about its mean, of several stators the largest."""
+def rms_about_mean(wave: xr.DataArray) -> xr.DataArray:
+    """Return the rms of a signal (..., sample) about its mean, of several stators the largest; loaded."""
     swing = wave.astype(float) - wave.mean("sample", dtype=float)
     rms: xr.DataArray = (swing**2).mean("sample") ** 0.5  # `std` of a case without a result warns
     return rms.max([d for d in ("stator",) if d in wave.dims]).compute()

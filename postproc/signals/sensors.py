@@ -21,7 +21,7 @@ from rubhpc.schema import TURNED
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     Floats = NDArray[np.float64]
 
@@ -154,37 +154,75 @@ def sense(
     InputError
         There is no such signal, or the rate or a sensor is out of range.
     """
-    if not 0.0 < rate < math.inf:
-        raise InputError(f"rate: {rate:g} Hz is out of range; give one above 0")
     for name in sensors:
         check_signal(name, case)
-    turns_at, duration, per_revolution = _turning(case)
-    if duration * rate < _FEWEST:
-        raise InputError(
-            f"rate: {rate:g} Hz gives {int(duration * rate)} samples of {duration:.3g} s; raise it"
-        )
+    clock = Clock(case, rate)
     data = narrow(case, list(sensors)).load()
-    highest = (
-        per_revolution
-        * float(np.gradient(turns_at(np.linspace(0.0, duration, 1000))).max())
-        / duration
-        * 999.0
-    )
-    times = 2 ** math.ceil(math.log2(max(_LEAST_OVERSAMPLING, highest / rate)))
-    fine = np.arange(int(duration * rate) * times) / (rate * times)
-    turns = turns_at(fine)
     found: dict[str, Any] = {}
     for name, given in sensors.items():
         sensor = given if isinstance(given, Sensor) else Sensor(**_known(given))
         rng = np.random.default_rng([seed, *name.encode()])
-        seen = between(data[name].values.astype(float))(turns * per_revolution)
-        seen = decimated(sensor.before_clock(seen, turns, rate * times), times)
+        seen = clock.before_converter(data[name].values, sensor)
         found[name] = "time", sensor.after_clock(seen, rng), dict(data[name].attrs)
-    past = (turns[::times] - key_phasor_angle / (2.0 * math.pi)) % 1.0
-    pulses = np.where(past < _PULSE_WIDTH / 360.0, PULSE, 0.0)
-    found["key_phasor"] = "time", pulses, {"units": "V", "long_name": "key-phasor"}
+    found["key_phasor"] = "time", clock.pulses(key_phasor_angle), {"units": "V", "long_name": "key-phasor"}
     about = {"units": "s", "long_name": "time"}
-    return xr.Dataset(found, coords={"time": ("time", fine[::times], about)})
+    return xr.Dataset(found, coords={"time": ("time", clock.time, about)})
+
+
+class Clock:
+    """The clock of a data logger during one case.
+
+    Parameters
+    ----------
+    case : Dataset
+        As of `sense`.
+    rate : float
+        Of the samples, Hz.
+
+    Attributes
+    ----------
+    time, turns : (n,), s and 1
+        Of each sample, from the beginning of the record: when it is taken, and how far the shaft has turned.
+    per_revolution : int
+        Samples of the case, not of the clock, a revolution.
+
+    Raises
+    ------
+    InputError
+        The rate is out of range, or gives less than 16 samples.
+    """
+
+    def __init__(self, case: xr.Dataset, rate: float) -> None:
+        check_rate(rate)
+        turns_at, duration, self._n_stored, self.per_revolution = _turning(case)
+        if duration * rate < _FEWEST:
+            raise InputError(
+                f"rate: {rate:g} Hz gives {int(duration * rate)} samples of {duration:.3g} s; raise it"
+            )
+        at = np.linspace(0.0, duration, 1000)
+        highest = self.per_revolution * float(np.gradient(turns_at(at), at).max())  # Hz, of what is stored
+        self._rate, self._times = rate, 2 ** math.ceil(math.log2(max(_LEAST_OVERSAMPLING, highest / rate)))
+        fine = np.arange(int(duration * rate) * self._times) / (rate * self._times)
+        self._fine_turns = turns_at(fine)
+        self.time, self.turns = fine[:: self._times], self._fine_turns[:: self._times]
+
+    def before_converter(self, values: ArrayLike, sensor: Sensor) -> Floats:
+        """Return what the converter of a sensor is given of a signal (n_sample,) of the case, (n,)."""
+        stored = np.asarray(values, dtype=float)[: self._n_stored]
+        wave = between(stored)(self._fine_turns * self.per_revolution)
+        seen = sensor.before_clock(wave, self._fine_turns, self._rate * self._times)
+        return decimated(seen, self._times)
+
+    def pulses(self, angle: float = 0.0) -> Floats:
+        """Return the key-phasor, (n,), V, of a mark that passes it at an angle, rad."""
+        past = (self.turns - angle / (2.0 * math.pi)) % 1.0
+        return np.where(past < _PULSE_WIDTH / 360.0, PULSE, 0.0)
+
+
+def check_rate(rate: float) -> None:
+    """Refuse a sampling rate, Hz, that is none."""
+    if not 0.0 < rate < math.inf:
+        raise InputError(f"rate: {rate:g} Hz is out of range; give one above 0")
 
 
 def _known(given: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -196,15 +234,16 @@ def _known(given: Mapping[str, Any]) -> Mapping[str, Any]:
     return given
 
 
-def _turning(case: xr.Dataset) -> tuple[Any, float, int]:
-    """Revolutions as a function of the time (s), how long the record is, and its samples a revolution."""
+def _turning(case: xr.Dataset) -> tuple[Any, float, int, int]:
+    """Revolutions as a function of the time (s), duration of the record, its samples, and those a turn."""
     if not is_run_up(case):
         data = narrow(case, ["spin_speed"])
-        n, rate = samples_per_revolution(case["revolution"]), float(data["spin_speed"]) / (2.0 * math.pi)
-        return (lambda time: time * rate), case.sizes["sample"] / (n * rate), n
+        n, n_sample = samples_per_revolution(case["revolution"]), case.sizes["sample"]
+        rate = abs(float(data["spin_speed"])) / (2.0 * math.pi)
+        return (lambda time: time * rate), n_sample / (n * rate), n_sample, n
     turning = narrow(case, ["speed", "time"]).load()
     turning = turning.isel(revolution=np.isfinite(turning["speed"].values))
     speeds, begins = turning["speed"].values, turning["time"].values
     ends = np.append(begins, begins[-1] + 2.0 * math.pi / speeds[-1]) - begins[0]
     n = round(1.0 / float(case[TURNED][1] - case[TURNED][0]))
-    return CubicSpline(ends, np.arange(ends.size)), float(ends[-1]), n
+    return CubicSpline(ends, np.arange(ends.size)), float(ends[-1]), n * speeds.size, n

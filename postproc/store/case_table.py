@@ -23,6 +23,7 @@ TABLES = (".csv", ".parquet")
 _ROW = "row"
 _ALONG = "revolution"
 _ALWAYS = ("speed", "time")
+_ABOUT = ("title", "study", "rig", "versions", "identity")
 
 
 def case_table(store: xr.Dataset, names: Sequence[str] = ()) -> xr.Dataset:
@@ -73,8 +74,13 @@ def case_table(store: xr.Dataset, names: Sequence[str] = ()) -> xr.Dataset:
         column = values.broadcast_like(shape).transpose(*axes).values.ravel()
         about = {k: str(v) for k, v in wanted[name].attrs.items() if k in ("units", "long_name")}
         columns[name] = (_ROW, _in_words(name, column, wanted[name]), about)
-    attrs = {k: v for k, v in store.attrs.items() if k in ("title", "study", "rig", "versions", "identity")}
-    return xr.Dataset(columns, attrs=attrs)
+    return xr.Dataset(columns, attrs=metadata_of(store))
+
+
+def metadata_of(store: xr.Dataset) -> dict[str, str]:
+    """Return what a file says of the store that it is made of: title, study, rig, versions and identity."""
+    given = {name: store.attrs[name] for name in _ABOUT if name in store.attrs}
+    return {name: value if isinstance(value, str) else json.dumps(value) for name, value in given.items()}
 
 
 def write_table(table: xr.Dataset, path: Path) -> None:
@@ -100,15 +106,22 @@ def write_table(table: xr.Dataset, path: Path) -> None:
         partial.unlink(missing_ok=True)
 
 
-def _write_parquet(table: xr.Dataset, path: Path) -> None:
+def import_parquet(file: str, instead: str = "") -> tuple[Any, Any]:
+    """Return pyarrow and its Parquet module; InputError with what to do `instead` where there are none."""
     try:
         import pyarrow
         from pyarrow import parquet
     except ImportError as error:
         raise InputError(
-            f"{path.name.removeprefix('.').removesuffix('.part')}: Parquet needs the package {error.name}; "
-            "install it with pip install 'rubhpc[parquet]', or export .csv"
+            f"{file}: Parquet needs the package {error.name}; install it with "
+            f"pip install 'rubhpc[parquet]'{instead}"
         ) from error
+    return pyarrow, parquet
+
+
+def _write_parquet(table: xr.Dataset, path: Path) -> None:
+    file = path.name.removeprefix(".").removesuffix(".part")
+    pyarrow, parquet = import_parquet(file, ", or export .csv")
     arrays, fields = [], []
     for name, column in table.items():
         values = column.values
@@ -116,8 +129,7 @@ def _write_parquet(table: xr.Dataset, path: Path) -> None:
         mask = np.isnan(values) if values.dtype.kind == "f" else None
         arrays.append(pyarrow.array(values.tolist() if values.dtype.kind == "O" else values, mask=mask))
         fields.append(pyarrow.field(str(name), arrays[-1].type, metadata=dict(column.attrs)))
-    about = {k: v if isinstance(v, str) else json.dumps(v) for k, v in table.attrs.items()}
-    schema = pyarrow.schema(fields, metadata=about)
+    schema = pyarrow.schema(fields, metadata=table.attrs)
     parquet.write_table(pyarrow.table(arrays, schema=schema), path, compression="zstd")
 
 
@@ -168,5 +180,4 @@ def revolution_table(store: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
         column = values.broadcast_like(shape).transpose(*rows).values.ravel()[has_turned]
         about = {k: str(v) for k, v in values.attrs.items() if k in ("units", "long_name")}
         columns[name] = (_ROW, column, about)
-    attrs = {k: v for k, v in store.attrs.items() if k in ("title", "study", "rig", "versions", "identity")}
-    return xr.Dataset(columns, attrs=attrs)
+    return xr.Dataset(columns, attrs=metadata_of(store))

@@ -123,8 +123,8 @@ def _reproduce(study: Path, output: Path | None, name: str, *, trust_rig: bool) 
 def plan(study: Path, output: Path | None, trust_rig: bool, part: str | None) -> int:
     """Estimate the cost of STUDY.toml and show what is done; writes nothing.
 
-    Core-hours come from cases spread over all axes, timed on this machine for some 15 s at most and scaled by
-    the predicted steps. Long cases are cut, and the rest of them is extrapolated.
+    Core-hours come from cases spread over all axes, timed on this machine for some 10 s at most and scaled by
+    the predicted steps. Long cases are cut, and scaled by the share that was done.
     """
     from rubhpc.running.plan import make_plan
     from rubhpc.running.progress import one_line

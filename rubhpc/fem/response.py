@@ -12,6 +12,7 @@ from scipy.linalg import eigvals, eigvalsh
 
 from rubhpc.errors import InputError
 from rubhpc.fem.modes import KINDS, modes, undamped_modes
+from rubhpc.fem.statics import sag_at_stators
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -79,6 +80,30 @@ def contact_free_amplitude(model: Model, spin: float, node: int | None = None) -
     rows = [model.rotor.index(node, name) for name in ("v", "w")]
     v, w = (response[row] if row >= 0 else 0.0 for row in rows)
     return float(abs(v + 1j * w) + abs(v - 1j * w)) / 2
+
+
+def contact_free_reach(model: Model, spin: float) -> float:
+    """Return the clearance, m, below which the steady contact-free motion reaches a stator; -inf without any.
+
+    A stator is reached by the amplitude towards it, `|v cos(angle) + w sin(angle)|`, and by the sag of the
+    shaft; its `clearance_offset` is gap.
+
+    Parameters
+    ----------
+    model : Model
+        At the spin (`rubhpc.fem.assemble.model_at`), where bearings depend on the speed.
+    spin : float
+        rad/s.
+    """
+    response = steady_response(model, spin)
+    nearer, _ = sag_at_stators(model)
+    reach = -math.inf
+    for stator, sag in zip(model.stators, nearer, strict=True):
+        rows = [model.rotor.index(stator.node, name) for name in ("v", "w")]
+        v, w = (response[row] if row >= 0 else 0.0 for row in rows)
+        towards = abs(v * math.cos(stator.angle) + w * math.sin(stator.angle))
+        reach = max(reach, float(towards + sag) - stator.clearance_offset)
+    return reach
 
 
 def first_lateral_frequency(model: Model) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import operator
+from contextlib import suppress
 from dataclasses import MISSING, field
 from numbers import Integral
 from types import MappingProxyType
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from rubhpc.errors import InputError, printable
 from rubhpc.input.matrix import encode_matrix, parse_matrix
 from rubhpc.input.messages import brief, nearest, place, quoted
-from rubhpc.input.quantity import out_of_range, parse_quantity
+from rubhpc.input.quantity import WithUnit, out_of_range, parse_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -32,6 +33,10 @@ def _parse_quantity(value: object, limits: Limits, where: str) -> float | str:
     words = limits.get("or_words", ())
     if isinstance(value, str) and value in words:
         return value
+    if (other := limits.get("or_unit")) and isinstance(value, str):
+        for unit in (limits["unit"], other):
+            with suppress(InputError):
+                return WithUnit.of(parse_quantity(value, unit, where), unit)
     try:
         return parse_quantity(value, limits["unit"], where)
     except InputError as error:
@@ -306,6 +311,7 @@ def quantity(
     at_least: float | None = None,
     below: float | None = None,
     or_words: tuple[str, ...] = (),
+    or_unit: str = "",
     added: bool = False,
 ) -> Any:
     """Declare a field that holds a finite number in `unit` (SI, readable by pint), or one of some words.
@@ -315,11 +321,14 @@ def quantity(
     doc, example : str
         Meaning in one line; a value as in a TOML file, `'"0.8 m"'`; for messages and the reference of keys,
         as in all declarations below.
+    or_unit : str
+        Another unit that the number may have, as another key says; text keeps its unit (`WithUnit`).
     added : bool
         Whether rigs of older stores have no such key.
     """
     limits = {"above": above, "at_least": at_least, "below": below, "or_words": or_words, "added": added}
-    return _declare("quantity", doc, example, default, unit=unit, **limits)
+    other = {"or_unit": or_unit} if or_unit else {}
+    return _declare("quantity", doc, example, default, unit=unit, **limits, **other)
 
 
 def series(

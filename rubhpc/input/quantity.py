@@ -19,7 +19,7 @@ LEAST, GREATEST = 1e-30, 1e30  # size of a quantity: beyond, sums of products of
 # One number, then a product of units. Nothing else reaches pint, whose grammar also takes sums and towers of
 # powers.
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,4})?"
-_UNIT = r"[^\W\d]\w{0,40}(?:(?:\^|\*\*)-?\d)?|%|°"
+_UNIT = r"[^\W\d]\w{0,40}(?:(?:\^|\*\*)-?\d(?:\.5)?)?|%|°"
 _JOIN = r"(?:\s*[*/·]\s*|\s+)"
 _TEXT = re.compile(rf"\s*({_NUMBER})\s*((?:1\s*/\s*)?(?:{_UNIT})(?:{_JOIN}\(?(?:{_UNIT})\)?){{0,7}})?\s*")
 
@@ -45,6 +45,19 @@ _EXAMPLES = {
     "Hz": '"31.56 Hz"',
     "": "0.3",
 }
+
+
+class WithUnit(float):
+    """A number read from text in one of two units that a field may have."""
+
+    unit: str
+
+    @classmethod
+    def of(cls, number: float, unit: str) -> WithUnit:
+        """Return a number in a unit."""
+        made = cls(number)
+        made.unit = unit
+        return made
 
 
 def parse_quantity(value: object, unit: str, where: str) -> float:

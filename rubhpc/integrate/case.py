@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from rubhpc.integrate.carried_tangent import CarriedTangent
 from rubhpc.integrate.compilation import (
     COLLOCATION,
     COMMON,
@@ -39,6 +40,7 @@ from rubhpc.integrate.measuring.samples import (
 )
 from rubhpc.integrate.measuring.settling import is_steady
 from rubhpc.integrate.modal_setup import ModalSetup
+from rubhpc.integrate.periodic_motions.collocated_motion import followed_motion
 from rubhpc.integrate.periodic_motions.direct import pass_directly
 from rubhpc.integrate.periodic_motions.lyapunov_spectrum import spectrum_of
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
@@ -66,6 +68,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.marches.march import March
     from rubhpc.integrate.measuring.measures import Judge
     from rubhpc.integrate.measuring.regimes import Verdict
+    from rubhpc.integrate.periodic_motions.collocated_motion import CollocatedMotion
     from rubhpc.integrate.setup import Setup
     from rubhpc.kernels.accumulators import Samples
     from rubhpc.kernels.trail import Trail
@@ -213,10 +216,11 @@ def _integrate(
     n_step = n_left = 0
     per_revolution = setup.samples_per_revolution
     settings = {"spin_speed": setup.spin, "clearance": clearance}
-    begin = partial(PiecewiseMotion, cast("ModalSetup", setup), clearance, friction)
-    if recording.is_transient_direct and isinstance(march, EventDrivenMarch) and march.has_closed_form:
+    begin = partial(followed_motion(setup), cast("ModalSetup", setup), clearance, friction)
+    if recording.is_transient_direct and isinstance(march, EventDrivenMarch):
         motions = solved_motions(march.setup, (clearance, friction, recording))
-        march, reason, n_transient, n_step, motion = pass_directly(march, begin, recording, motions)
+        followed = partial(PiecewiseMotion, march.setup, clearance, friction)
+        march, reason, n_transient, n_step, motion = pass_directly(march, followed, recording, motions)
         if motion is not None and motion.record is not None:
             record, n_own_step, n_own_left = motion.record
             return _counted(record.copied(), n_transient, n_step + n_own_step, march.n_left + n_own_left)
@@ -309,10 +313,10 @@ def _spectra(samples: Samples, model: Model) -> dict[str, Floats]:
 
 
 def exponents_of(
-    march: March, begin: Callable[[State], PiecewiseMotion], final: State, n_exponent: int
+    march: March, begin: Callable[[State], PiecewiseMotion | CollocatedMotion], final: State, n_exponent: int
 ) -> dict[str, float]:
     """Lyapunov exponents from where a march has ended; NaN where it has no closed form."""
-    if isinstance(march, EventDrivenMarch) and march.has_closed_form:
+    if isinstance(march, EventDrivenMarch | CollocationMarch):
         found = spectrum_of(partial(begin, final), n_exponent)
         largest = found["lyapunov_1"]
         return found if math.isnan(largest) else found | {"lyapunov_exponent": largest}
@@ -374,18 +378,14 @@ def solver_of(
     final: State,
 ) -> Solver | None:
     """Solver for periodic motions near the end of a march; None where it has no closed form."""
-    if isinstance(march, EventDrivenMarch) and march.has_closed_form and isinstance(setup, ModalSetup):
+    if isinstance(march, EventDrivenMarch | CollocationMarch) and isinstance(setup, ModalSetup):
         return Solver(setup, clearance, friction, final, march)
     return None
 
 
 def trail_of(march: March, recording: Recording) -> Trail | None:
     """Record the events of a record where its tangent may be propagated along them."""
-    if (
-        isinstance(march, EventDrivenMarch)
-        and march.has_closed_form
-        and recording.revolutions >= LEAST_REVOLUTIONS
-    ):
+    if isinstance(march, EventDrivenMarch) and recording.revolutions >= LEAST_REVOLUTIONS:
         trail = _kept(march) or march.new_trail()
         march.keep(trail)
         return trail
@@ -421,8 +421,11 @@ def neighbours_of(
     recording: Recording,
 ) -> Neighbours:
     """A motion next to the one from the end of a march."""
-    if isinstance(march, EventDrivenMarch) and march.has_closed_form:
+    if isinstance(march, EventDrivenMarch):
         return TangentMotion(
             cast("Callable[[State], EventDrivenMarch]", start), final, setup, recording, trail, march
         )
+    if isinstance(march, CollocationMarch):
+        march.start_again(final)
+        return CarriedTangent(march)
     return Marches(start, final, setup, recording)

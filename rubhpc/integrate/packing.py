@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import connected_components
 from rubhpc.fem.statics import sag_at_stators
 from rubhpc.kernels._jit import plain
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, N_DEGREE, TORSION, Pairs, V, W, rim_sense
-from rubhpc.kernels.laws import FRICTION_LAWS, MULTIPLIER, Law
+from rubhpc.kernels.laws import FRICTION_LAWS, MULTIPLIER, NORMAL_LAWS, Law
 from rubhpc.kernels.linear import Linear
 
 if TYPE_CHECKING:
@@ -167,13 +167,14 @@ def output_degrees(model: Model) -> Ints:
 
 def law_of(contact: Contact) -> Law:
     """Laws of a study for kernels; what it omits keeps its default."""
-    given = {key: getattr(contact, key) for key in Law._fields if key != "friction_law"}
+    given = {key: getattr(contact, key) for key in Law._fields if not key.endswith("_law")}
     values: dict[str, Any] = {
         key: np.array(value) if isinstance(value, tuple) else float(value)
         for key, value in given.items()
         if value is not None
     }
-    return Law(friction_law=FRICTION_LAWS.index(contact.friction_law), **values)
+    friction, normal = FRICTION_LAWS.index(contact.friction_law), NORMAL_LAWS.index(contact.law)
+    return Law(friction_law=friction, normal_law=normal, **values)
 
 
 def pairs_of(

@@ -11,21 +11,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.errors import InputError, NoPeriodicMotion
-from rubhpc.integrate.case import run_case
-from rubhpc.integrate.marches.closed_form import closed_form_march
+from rubhpc.integrate.case import march_of, run_case
 from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.modal_setup import ModalSetup
-from rubhpc.integrate.periodic_motions.piecewise_motion import Change, PiecewiseMotion
+from rubhpc.integrate.periodic_motions.collocated_motion import CollocatedMotion, followed_motion
 from rubhpc.integrate.periodic_motions.revolution import least_of
 from rubhpc.integrate.periodic_motions.shooting import NotConverged, Orbit, shoot
 from rubhpc.integrate.record import Record, State
-from rubhpc.integrate.scheme import Scheme
 from rubhpc.integrate.start import fit_to_gaps, start_of
 from rubhpc.integrate.transient import pass_revolutions
 from rubhpc.schema import REGIME
 from rubhpc.spectra import amplitude_spectrum
 
 if TYPE_CHECKING:
+    from rubhpc.integrate.periodic_motions.piecewise_motion import Change, PiecewiseMotion
     from rubhpc.integrate.setup import Setup
     from rubhpc.study.initial import Initial
     from rubhpc.study.tables import Recording
@@ -141,11 +140,8 @@ def find_periodic_motion(
     NoPeriodicMotion
         None was found; the message gives the reason.
     """
-    if not isinstance(setup, ModalSetup) or setup.scheme is not Scheme.EVENT_DRIVEN:
-        raise InputError(
-            "periodic: it needs motion in closed form between events; use method modal, normal fixed, "
-            "stators of linear geometry, and friction_law sliding or coulomb"
-        )
+    if not isinstance(setup, ModalSetup):
+        raise InputError('periodic: it needs [integrator] method = "modal"')
     try:
         piecewise, orbit = _search(setup, clearance, friction, period, recording, initial)
     except NoClosedForm:
@@ -177,23 +173,23 @@ def _search(
     period: int,
     recording: Recording,
     initial: State | Initial,
-) -> tuple[PiecewiseMotion, Orbit]:
+) -> tuple[PiecewiseMotion | CollocatedMotion, Orbit]:
     """Shoot from the state, then from the end of a simulation."""
     if isinstance(initial, State):
         state, first = fit_to_gaps(initial, setup, clearance), 0
     else:
         state, first = start_of(initial, setup, clearance), recording.longest_transient
-    unstable: tuple[PiecewiseMotion, Orbit] | None = None
+    unstable: tuple[PiecewiseMotion | CollocatedMotion, Orbit] | None = None
     reason = ""
     for span in (first, *SPANS):
         if span:
-            march = closed_form_march(setup)(setup, clearance, friction, state, None)
+            march = march_of(setup.scheme, setup)(setup, clearance, friction, state, None)
             ended = pass_revolutions(march, recording, span)
             if ended is not None:
                 reason = ended
                 break
             state = fit_to_gaps(march.final(), setup, clearance)
-        piecewise = PiecewiseMotion(setup, clearance, friction, state)
+        piecewise = followed_motion(setup)(setup, clearance, friction, state)
         try:
             orbit = shoot(piecewise, piecewise.start, piecewise.states, period)
         except NotConverged as problem:
@@ -251,7 +247,7 @@ def record_of_period(
     )
 
 
-def _events(piecewise: PiecewiseMotion, orbit: Orbit) -> list[ContactEvent]:
+def _events(piecewise: PiecewiseMotion | CollocatedMotion, orbit: Orbit) -> list[ContactEvent]:
     """Events of a period in the order of time."""
     found = []
     for i_revolution, revolution in enumerate(orbit.revolutions):

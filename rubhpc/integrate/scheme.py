@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from rubhpc.schema import SCHEMES
+from rubhpc.study.tables import check_method
 
 if TYPE_CHECKING:
     from rubhpc.study.study import Contact, Integrator
@@ -33,6 +34,7 @@ def scheme_of(contact: Contact, integrator: Integrator, *, is_bent: bool = False
     InputError
         For a bent stator with laws or an integrator that have none.
     """
+    check_method(contact, integrator, is_bent=is_bent)
     if integrator.method == "central-difference":
         return Scheme.CENTRAL_DIFFERENCE
     is_general = is_bent or contact.normal == "updated" or contact.closed_form == "never"

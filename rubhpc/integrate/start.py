@@ -19,6 +19,7 @@ from rubhpc.integrate.packing import degrees_of
 from rubhpc.integrate.record import State
 from rubhpc.kernels.complementarity import UNSOLVED
 from rubhpc.kernels.contact_pairs import AXIAL, V, W, normal_and_gap
+from rubhpc.kernels.laws import HERTZ
 from rubhpc.kernels.lemke import solve_lemke
 from rubhpc.study.initial import CONTACT_FREE, REST
 
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.model import Model
     from rubhpc.integrate.setup import Setup
+    from rubhpc.kernels.laws import Law
     from rubhpc.study.initial import Initial
 
     Floats = NDArray[np.float64]
@@ -36,7 +38,7 @@ TOLERANCE = 1e-12  # m, a hundred times the tolerance of the integrators: a cont
 PARTED = 1e-9  # m, beyond which a closed contact has opened
 TURNED = 1e-10  # of the forces, by which they may have turned with their normals in the last pass
 LEAST_FORCE = np.finfo(float).tiny  # N, least force that marks a contact as closed
-MOST_PASSES = 20  # for the curved gap of the updated normal; three or four are usual
+MOST_PASSES = 40  # for curved gaps and springs; three or four are usual
 
 
 def fit_to_gaps(state: State, setup: Setup, clearance: float) -> State:
@@ -62,19 +64,24 @@ def fit_to_gaps(state: State, setup: Setup, clearance: float) -> State:
     return _fitted(state, setup, clearance)[0]
 
 
-def _fitted(state: State, setup: Setup, clearance: float, softness: float = 0.0) -> tuple[State, bool]:
-    """The state of `fit_to_gaps`, whose gaps give by `softness`, m/N, and whether its forces are found."""
+def _fitted(state: State, setup: Setup, clearance: float, *, is_soft: bool = False) -> tuple[State, bool]:
+    """The state of `fit_to_gaps`, and whether its forces are found.
+
+    Gaps that are soft give to the forces by the springs of the law.
+    """
     allowed = np.zeros_like(state.contact_force) if state.overlap is None else state.overlap
     begin = displacement = _as_seen(state.displacement, setup)
     gap, gap_jacobian = gaps(displacement, setup, clearance)
     force, is_found = np.zeros_like(gap), not np.any(gap + allowed < -TOLERANCE)
+    softness = np.zeros_like(gap)  # m/N
     if not is_found:
         for _ in range(MOST_PASSES):
             shape = static_shapes(gap_jacobian.T, setup)
-            compliance = gap_jacobian @ shape + softness * np.eye(gap.size)
+            compliance = gap_jacobian @ shape + np.diag(softness)
             force = _least_forces(compliance, gap + allowed + gap_jacobian @ (begin - displacement))
             displacement = begin + shape @ force
             before = gap_jacobian
+            softness = compression(setup.law, force) if is_soft else softness
             gap, gap_jacobian = gaps(displacement, setup, clearance)
             excess = gap + allowed + softness * force
             is_turned = np.abs((gap_jacobian - before).T @ force).max() > TURNED * force.max()
@@ -104,7 +111,7 @@ def at_rest(setup: Setup, clearance: float) -> State:
         return state
     state = replace(state, contact_force=np.full(gap.size, LEAST_FORCE))  # some may be pushed onto others
     spring = setup.law.stiffness
-    state, is_found = _fitted(state, setup, clearance, softness=1.0 / spring if spring else 0.0)
+    state, is_found = _fitted(state, setup, clearance, is_soft=spring > 0.0)
     force = state.contact_force
     state = replace(state, contact_force=np.where(force > LEAST_FORCE, force, 0.0))
     is_held = isinstance(setup, ModalSetup) or not state.contact_force.any()  # the former takes no others
@@ -117,6 +124,15 @@ def at_rest(setup: Setup, clearance: float) -> State:
             'from = "contact_free"'
         )
     return with_overlap(state, setup, clearance) if spring else state
+
+
+def compression(law: Law, force: Floats) -> Floats:
+    """Compression of the springs of a law under forces (q,), over these, m/N."""
+    if law.normal_law == HERTZ:
+        return np.where(
+            force > 0.0, law.stiffness ** (-2 / 3) * np.maximum(force, LEAST_FORCE) ** (-1 / 3), 0.0
+        )
+    return np.full(force.size, 1.0 / law.stiffness)
 
 
 def with_overlap(state: State, setup: Setup, clearance: float) -> State:

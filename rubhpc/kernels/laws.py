@@ -19,17 +19,20 @@ if TYPE_CHECKING:
 # In a study; their places are the numbers below.
 FRICTION_LAWS = ("sliding", "coulomb", "stribeck", "table")
 SLIDING, COULOMB, STRIBECK, TABLE = range(4)
+NORMAL_LAWS = ("lagrange", "penalty", "hertz")
+LAGRANGE, PENALTY, HERTZ = range(3)
 
 
 _NO_TABLE = np.zeros(0)
 
 
 class Law(Struct):
-    """Laws of a case; all fields but the first have the names of the keys of `[contact]`."""
+    """Laws of a case; all fields but the first two have the names of the keys of `[contact]`."""
 
     friction_law: int = SLIDING  # one of the numbers above
-    stiffness: float = 0.0  # of the penalty, N/m; 0: the gap is closed exactly, by a multiplier
-    damping: float = 0.0  # of the penalty, N s/m
+    normal_law: int = LAGRANGE
+    stiffness: float = 0.0  # N/m, of Hertz's law N/m^1.5; 0: the gap is closed exactly, by a multiplier
+    damping: float = 0.0  # N s/m, of Hertz's law s/m
     restitution: float = 0.0  # normal velocity after an impact over that before; 0: the gap is closed at once
     static_friction_ratio: float = 1.0  # coefficient of friction at rest over that in sliding
     stribeck_speed: float = 1.0  # m/s, at which the excess of friction at rest has decayed to 1/e

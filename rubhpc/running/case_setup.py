@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -74,7 +74,7 @@ def operation_of(grid: CaseGrid, case: Case) -> Operation:
 
 MOST_SETUPS = 4  # a block shares one, and neighbours often do
 MOST_BYTES = 2**30  # of contact modes, without those of the current case; those of 32 stators fill a gigabyte
-_MOST_COUNTED = 2_000  # cases in which preparations are counted
+_MOST_COUNTED = 2_000  # cases whose set-ups are counted
 
 
 class KeptSetups:
@@ -118,38 +118,22 @@ class KeptSetups:
                 total -= n
 
 
-class Preparations(NamedTuple):
-    """How many times a rank that computes all alone prepares a speed, and a friction."""
+def count_set_ups(grid: CaseGrid, missing: NDArray[np.bool_]) -> float:
+    """How many set-ups a rank makes that computes all missing cases, in the order of a run.
 
-    speed: float
-    friction: float
-
-    def for_some(self, share: float, n_case: int) -> Preparations:
-        """Those of a share of the `n_case` cases, anywhere among them: what no case needs is not prepared."""
-        return Preparations(*(touched(n, share, n_case) for n in self))
-
-
-def touched(n: float, share: float, n_case: float) -> float:
-    """How many of n groups of `n_case` cases hold one of a share of these, anywhere among them."""
-    return n * (1.0 - (1.0 - share) ** (n_case / n)) if n and share < 1.0 else n
-
-
-def count_preparations(grid: CaseGrid, missing: NDArray[np.bool_]) -> Preparations:
-    """Go through missing cases in the order of a run; of many the first stand for the others."""
-    counted, speeds, frictions = 0, 0, 0
-    kept: OrderedDict[tuple[float, ...], set[float]] = OrderedDict()  # frictions of each set-up
+    Of many cases the first stand for the others.
+    """
+    n_counted, n_set_up = 0, 0
+    kept: OrderedDict[tuple[float, ...], None] = OrderedDict()
     for block in (b for sequence in grid.sequences() for b in sequence if missing_share(b, missing)):
-        if counted >= _MOST_COUNTED:
+        if n_counted >= _MOST_COUNTED:
             break
         window = tuple(slice(s, s + n) for s, n in zip(block.start, block.shape, strict=True))
         for place in np.argwhere(missing[window]) + np.array(block.start):
-            key, friction = grid.setup_values(place.tolist())
-            speeds += key not in kept
-            known = kept.setdefault(key, set())
+            key, _ = grid.setup_values(place.tolist())
+            n_set_up += key not in kept
+            kept[key] = None
             if len(kept) > MOST_SETUPS:
                 kept.popitem(last=False)
-            frictions += friction not in known
-            known.add(friction)
-            counted += 1
-    scale = int(missing.sum()) / max(counted, 1)
-    return Preparations(scale * speeds, scale * frictions)
+            n_counted += 1
+    return n_set_up * int(missing.sum()) / max(n_counted, 1)

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.running.case_setup import MOST_BYTES, MOST_SETUPS, count_preparations, touched
-from rubhpc.running.plan_estimate import Cost, Estimate, percent
-from rubhpc.running.sampled_cases import CaseTimer, peak_memory, time_block
+from rubhpc.running.case_setup import MOST_BYTES, MOST_SETUPS, count_set_ups
+from rubhpc.running.sampled_cases import CaseTimer, Estimate, memory
 from rubhpc.schema import DIVERGED, DONE, FAILED, INFERRED, MISSING, STATUS
 from rubhpc.storage.duration import duration, span
 from rubhpc.storage.growth import origins
@@ -30,7 +29,6 @@ from rubhpc.threads import on_one_thread
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rubhpc.running.case_setup import Preparations
     from rubhpc.running.sampled_cases import Sample
     from rubhpc.storage.manifest import Manifest
     from rubhpc.study.cases import CaseGrid
@@ -38,13 +36,12 @@ if TYPE_CHECKING:
 
 _LINE = 400  # bytes of a case in a journal, about, for one stator
 _OWN_COORDINATES = 9  # of the dimensions after the axes, the stators and the settings
-_SECONDS, _LEAST = 13.0, 4.0  # wall time of all, and of timing at least
+_SECONDS, _LEAST = 12.0, 4.0  # wall time of all, and of timing at least
 _OFF = 2.0  # factor by which the number of cases of a refined map is off, at most, as a rule (0.5 to 1.9)
 _FOR_HALF, _MANY, _LONG = 3.0, 4, 600.0  # s of it to time half of so many stators, if all takes so many s
-_AT_EDGES = 1.1  # seconds per step of cases that a refined map computes, over that of all cases, about
 _AGREED = 1.06  # most over least time, up to which no range is given
-_FEW = 3  # cases, which may all miss the main cost
-_ROOM = 1.15  # memory for contact modes over what their tables and parts hold (1.04 to 1.12, rings of 16)
+_MAIN = 0.4  # share of the time from which a part of it is named
+_FILE, _BYTE = 5e-4, 3e-9  # processor seconds to write a file, and a byte in it, about
 _LEDGERS = 2  # copies of the measures of all cases while they are packed, about
 _PRIVATE_FILES = 8  # manifests, journals, records of runs
 
@@ -125,21 +122,17 @@ class Plan:
     @property
     def _timed(self) -> list[str]:
         """Number of timed cases, and how well they represent the others."""
-        cases = self.sample.cases
-        if not cases:
+        n, cut = self.sample.n_case, self.sample.cut
+        if not n:
             return []
-        n, cut = len(cases), [case for case in cases if not case.is_whole]
         texts = [f"timed       {n} case{'s' * (n > 1)}" + ", all missing ones" * (n == self.counts[MISSING])]
         if cut:
-            shares = [case.share for case in cut if case.share > 0.0]
-            ends = dict.fromkeys(percent(share) for share in (min(shares), max(shares))) if shares else ()
-            known = f" at {' to '.join(ends)} of it" if ends else ""
+            shares = [_percent(share) for share in (min(cut), max(cut))]
             memory = " or memory" * self.sample.was_full
+            known = f" at {' to '.join(dict.fromkeys(shares))} of it" if max(cut) > 0.0 else ""
             texts.append(f"{len(cut)} cut for time{memory}{known}, the rest extrapolated")
         if self._range and n < self.counts[MISSING]:
-            few = "are few and differ" if n <= _FEW else "differ"
-            share = "two plans in three" if n <= _FEW else "eight to nine plans in ten"
-            texts.append(f"they {few}: such a range contains the time in {share}")
+            texts.append("they differ: such a range contains the time in eight to nine plans in ten")
         return ["; ".join(texts)]
 
     @property
@@ -184,7 +177,7 @@ class Plan:
             f"in {n_sequence} sequential sweep{'s' * (n_sequence > 1)}: more ranks than that would be idle"
         )
         idle = "more ranks would be idle" if n_sequence == n_block else sweeps
-        per_case = sum(math.prod(manifest.extent(v)) * np.dtype(v.dtype).itemsize for v in manifest.variables)
+        per_case = _bytes_of_case(manifest)
         is_packed = self.n_file_running > self.n_file
         files = f"{self.n_file} files" + f", up to {self.n_file_running} before a run packs them" * is_packed
         compiled = "; includes compilation, less from now on" if self.sample.has_compiled else ""
@@ -274,9 +267,9 @@ def make_plan(study: Study, part: str | None = None, say: Callable[[str], None] 
 
     began_timing = time.process_time()
     end = max(began + _SECONDS, time.monotonic() + _LEAST)
-    n_stator = len(study.rig.stator)
-    timer = CaseTimer(grid, end - (_FOR_HALF if n_stator >= _MANY else 0.0))
-    sample = timer.time_cases(missing, steps_at, say) if left else timer.sample
+    is_large = len(study.rig.stator) >= _MANY and not study.rig.carrier
+    timer = CaseTimer(grid, end - _FOR_HALF * is_large)
+    sample = timer.time_cases(missing, steps, steps_at, say) if left else timer.sample
     share, n_expected, off = 1.0, None, 1.0
     if refinement is not None:
         asked = refinement.asked()
@@ -284,43 +277,31 @@ def make_plan(study: Study, part: str | None = None, say: Callable[[str], None] 
         n_left = max(n_expected - int((asked.cases.ravel() & known).sum()), 0)
         share = min(n_left / max(int((~known).sum()), 1), 1.0)
         off = _OFF if asked.edges is None else 1.0
-    found = bound = Estimate(0.0, 0.0, 0.0)
-    mostly, memory = "", 0.0
+    bound, mostly, memory = Estimate(0.0, 0.0, 0.0), "", 0.0
     if left:
         n_missing = int(missing.sum())
-        cost = Cost(
-            cases=sample.cases,
-            n_case=n_missing,
-            steps=steps,
-            prepared=count_preparations(grid, missing),
-            n_block=len(left),
-            block=0.0 if sample.record is None else time_block(manifest, sample.record),
-        )
-        found = bound = cost.estimate()
-        mostly = cost.mostly(study)
-        if n_stator >= _MANY and found.seconds > _LONG and not study.rig.carrier:
-            half = timer.time_half(_FOR_HALF)
-            advice = f"with half of the {n_stator} stators a case took {half:.2g} of the time"
-            mostly = "; ".join(filter(None, (mostly, advice * math.isfinite(half))))
-        if refinement is not None:
-            some = replace(
-                cost,
-                n_case=max(round(share * n_missing), 1),
-                steps=_AT_EDGES * share * steps,
-                prepared=cost.prepared.for_some(share, n_missing),
-                n_block=touched(len(left), share, n_missing),
-            )
-            seconds, least, most = some.estimate()
-            found = Estimate(min(seconds, bound.seconds), least / off, most * off)
-        if sample.cases:
-            memory = _memory(sample, None if study.changes_speed else cost.prepared)
+        writing = _FILE * len(left) * len(manifest.variables) + _BYTE * n_missing * _bytes_of_case(manifest)
+        n_set_up = count_set_ups(grid, missing)
+        once = writing + n_set_up * sample.set_up
+        bound = Estimate(*(seconds + once for seconds in sample.estimate(n_missing, steps)))
+        parts = {
+            f"set-ups of {round(n_set_up)} rigs and speeds": n_set_up * sample.set_up,
+            "writing blocks; a larger [run] block or fewer [record] keep takes less": writing,
+            **_transient(study, bound.seconds - once),
+        }
+        mostly = _mostly(parts, bound.seconds)
+        if is_large and bound.seconds > _LONG and math.isfinite(half := timer.time_half(_FOR_HALF)):
+            advice = f"with half of the {len(study.rig.stator)} stators a case took {half:.2g} of the time"
+            mostly = "; ".join(filter(None, (mostly, advice)))
+        if sample.batches:
+            memory = _memory(study, sample, n_missing) + math.prod(grid.chunk) * _bytes_of_case(manifest)
             memory += _LEDGERS * grid.n_case * kind.itemsize
     return Plan(
         grid=grid,
         manifest=manifest,
         counts=count(status[is_in_part]),
         steps=round(share * steps),
-        time=found,
+        time=Estimate(share * bound.seconds, share * bound.least / off, share * bound.most * off),
         bound=bound,
         sample=sample,
         spent=time.process_time() - began_timing - sample.loading,
@@ -331,21 +312,44 @@ def make_plan(study: Study, part: str | None = None, say: Callable[[str], None] 
     )
 
 
-def _memory(sample: Sample, prepared: Preparations | None) -> float:
-    """Bytes that a process holds at most, but for the measures of all cases.
+def _transient(study: Study, seconds: float) -> dict[str, float]:
+    """Time of the transient, by its name, where it is known, of the time of cases."""
+    recording, n = study.recording, study.recording.transient
+    if not isinstance(n, int) or study.changes_speed or study.branch is not None:
+        return {}
+    return {f"the transient, {n} revolutions": seconds * n / (n + recording.revolutions)}
+
+
+def _mostly(parts: dict[str, float], whole: float) -> str:
+    """Name the part that takes most of the whole time, and what would help; "" where nothing stands out."""
+    text, seconds = max(parts.items(), key=lambda item: item[1])
+    name, _, helps = text.partition("; ")
+    share = f"{name} ({_percent(seconds / whole)} of the time)"
+    return share + f"; {helps}" * bool(helps) if seconds > _MAIN * whole else ""
+
+
+def _memory(study: Study, sample: Sample, n_missing: int) -> float:
+    """Bytes that a process holds at most, but for its block and the measures of all cases.
 
     In a ring those are contact modes: of the longest case, and of set-ups and frictions that are kept beside
-    them, which those of run-ups include. This process, which has run cases and written a block, has held as
-    much otherwise.
+    them, which those of run-ups include.
     """
-    modes = [case.n_byte for case in sample.cases]
-    if not any(modes):
-        return peak_memory()
-    beside = 0.0
-    if prepared is not None:
-        n_kept = min(prepared.friction, MOST_SETUPS * prepared.friction / max(prepared.speed, 1.0)) - 1.0
-        beside = min(MOST_BYTES, max(n_kept, 0.0) * float(np.mean(modes)))
-    return max(peak_memory(), sample.memory + _ROOM * (max(modes) + beside))
+    modes, beside = [batch.n_byte for batch in sample.batches], 0.0
+    if len(study.rig.stator) > 1 and not study.changes_speed:
+        n_friction = max(len(axis.values) for axis in study.axes if axis.name == "friction")
+        n_kept = min(MOST_SETUPS * n_friction, n_missing) - 1
+        beside = min(MOST_BYTES, n_kept * float(np.mean(modes)))
+    return max(memory("VmHWM:"), sample.memory + max(modes) + beside)
+
+
+def _bytes_of_case(manifest: Manifest) -> int:
+    """Bytes of the arrays of a case, before compression."""
+    return sum(math.prod(manifest.extent(v)) * np.dtype(v.dtype).itemsize for v in manifest.variables)
+
+
+def _percent(share: float) -> str:
+    """A share of a case in percent: 0.3 %, 12 %."""
+    return f"{100.0 * share:.2g} %"
 
 
 def _size(n_byte: float) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, TypedDict
 
 from rubhpc.input.fields import FieldError, check_fields, choice, quantity, series
+from rubhpc.input.quantity import WithUnit
 from rubhpc.models import MODELS, chosen, default_of
 
 if TYPE_CHECKING:
@@ -21,16 +22,18 @@ CLOSED_FORM: dict[str, ClosedForm] = {  # of friction laws
 }
 # Keys of [contact] that belong to some laws only, and what their absence means there: None needs them.
 NEEDS_LAW: dict[str, tuple[str, tuple[str, ...], str]] = {
-    "stiffness": ("law", ("penalty",), "a multiplier has none"),
-    "damping": ("law", ("penalty",), "a multiplier has none"),
+    "stiffness": ("law", ("penalty", "hertz"), "a multiplier has none"),
+    "damping": ("law", ("penalty", "hertz"), "a multiplier has none"),
     "restitution": ("law", ("lagrange",), "a penalty's rebound comes from its spring and damper"),
     "static_friction_ratio": ("friction_law", ("coulomb", "stribeck"), "this law has no such ratio"),
     "stribeck_speed": ("friction_law", ("stribeck",), "other laws have no such speed"),
     "slip_speed": ("friction_law", ("table",), "other laws have no table"),
     "friction_ratio": ("friction_law", ("table",), "other laws have no table"),
 }
+UNITS = {"stiffness": ("N/m", "N/m^1.5"), "damping": ("N*s/m", "s/m")}  # of a penalty, of Hertz's law
 _EXAMPLES = {
     ("law", "penalty"): {"stiffness": "1e8"},
+    ("law", "hertz"): {"stiffness": '"1e10 N/m^1.5"'},
     ("friction_law", "stribeck"): {"static_friction_ratio": "1.3", "stribeck_speed": '"0.1 m/s"'},
     ("friction_law", "table"): {"slip_speed": "[0, 0.1, 1.0]", "friction_ratio": "[1.3, 1.1, 1.0]"},
 }
@@ -41,16 +44,27 @@ class ContactKeys:
     """What [contact] gives, each key for itself; axes of the grid may give the rest."""
 
     law: str = choice(
-        doc="Contact law: multipliers that close gaps exactly, or a spring and damper (penalty).",
+        doc="Contact law: multipliers that close gaps exactly, a spring and damper (penalty), or Hertz's law "
+        "with Hunt and Crossley's damping.",
         example='"penalty"',
-        of=("lagrange", "penalty"),
+        of=("lagrange", "penalty", "hertz"),
         default="lagrange",
     )
     stiffness: float | None = quantity(
-        "N/m", doc="Stiffness of the penalty.", example='"1e8 N/m"', default=None, above=0
+        "N/m",
+        doc="Stiffness of the penalty; of Hertz's law in N/m^1.5.",
+        example='"1e8 N/m"',
+        default=None,
+        above=0,
+        or_unit="N/m^1.5",
     )
     damping: float | None = quantity(
-        "N*s/m", doc="Damping of the penalty.", example='"100 N*s/m"', default=None, at_least=0
+        "N*s/m",
+        doc="Damping of the penalty; of Hertz's law in s/m: force times rate of penetration.",
+        example='"100 N*s/m"',
+        default=None,
+        at_least=0,
+        or_unit="s/m",
     )
     restitution: float | None = quantity(
         "",
@@ -127,8 +141,8 @@ class ContactKeys:
 
     @property
     def closed_form(self) -> ClosedForm:
-        """When the modal scheme has a closed form of contact; elsewhere it takes short steps."""
-        if self.normal == "updated":
+        """When the modal scheme has a closed form of contact; elsewhere it is collocation."""
+        if self.normal == "updated" or self.law == "hertz":
             return "never"
         return CLOSED_FORM[self.friction_law]
 
@@ -162,6 +176,12 @@ class Contact(ContactKeys):
             for key, example in needed.items():
                 if getattr(self, kind) == law and getattr(self, key) is None:
                     raise FieldError(key, f'missing; {kind} = "{law}" needs one, such as {key} = {example}')
+        for key, units in UNITS.items():
+            given, unit = getattr(self, key), units[self.law == "hertz"]
+            if isinstance(given, WithUnit):
+                if given.unit != unit:
+                    raise FieldError(key, f'{given:g} {given.unit}: law = "{self.law}" needs one in {unit}')
+                object.__setattr__(self, key, float(given))
         if self.restitution is not None and self.restitution > 1:
             raise FieldError("restitution", f"{self.restitution:g} is out of range; it must be at most 1")
         if self.slip_speed is not None and self.friction_ratio is not None:

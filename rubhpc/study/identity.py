@@ -139,8 +139,7 @@ def identity_parts(study: Study) -> dict[str, Any]:
     if study.sample is not None:
         ranges = {axis.name: asdict(axis.drawn_from) for axis in study.axes if axis.drawn_from}
         parts["sample"] = {
-            "method": study.sample.method,
-            "seed": study.sample.seed,
+            **{key: value for key, value in study.sample.as_dict().items() if key != "n"},
             "ranges": ranges,
             **({} if study.sample.can_grow else {WHOLE: study.sample.n}),
         }

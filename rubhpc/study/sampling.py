@@ -14,10 +14,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.errors import InputError
+from rubhpc.study.rub_share import balanced
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from rubhpc.rig.rig import Rig
     from rubhpc.study.axes import Axis
     from rubhpc.study.tables import Sample
 
@@ -32,18 +34,20 @@ def cases_per_point(n_range: int) -> int:
     return n_range + 2
 
 
-def draw(axes: Sequence[Axis], sample: Sample) -> tuple[Axis, ...]:
+def draw(axes: Sequence[Axis], sample: Sample, rig: Rig) -> tuple[Axis, ...]:
     """Return the axes with values drawn where they have a range; these then share the dimension `case`.
 
     Parameters
     ----------
     axes : sequence of Axis
         One at least from `make_range`, two for Saltelli's design.
+    rig : Rig
+        Of which `sample.rub_share` decides whether a case rubs.
 
     Raises
     ------
     InputError
-        When there are fewer ranges, or too many cases.
+        When there are fewer ranges, too many cases, or too few that rub.
     """
     ranges = [axis for axis in axes if axis.drawn_from is not None]
     if not ranges or (sample.is_saltelli and len(ranges) < 2):
@@ -54,31 +58,38 @@ def draw(axes: Sequence[Axis], sample: Sample) -> tuple[Axis, ...]:
     if n_case > MOST_DRAWN:
         size = f"{sample.n} points of {len(ranges)} ranges make {n_case} cases"
         raise InputError(f"[sample] n: {size}, too many; the limit is {MOST_DRAWN}, use a smaller n")
-    # Of the unit cube: what SALib would make of ranges may change with its version.
-    shares = iter(_points(len(ranges), sample).T)
+
+    def drawn(n: int) -> list[tuple[float, ...]]:
+        # Of the unit cube: what SALib would make of ranges may change with its version.
+        spans = [axis.drawn_from for axis in ranges if axis.drawn_from is not None]
+        shares = _points(len(ranges), sample, n).T.tolist()
+        columns = [map(span.at, column) for span, column in zip(spans, shares, strict=True)]
+        return list(zip(*columns, strict=True))
+
+    share = sample.rub_share
+    points = drawn(sample.n) if share is None else balanced(axes, rig, sample.n, share, drawn)
+    columns = iter(zip(*points, strict=True))
     return tuple(
-        replace(axis, dimension=CASE, values=tuple(map(axis.drawn_from.at, next(shares).tolist())))
-        if axis.drawn_from is not None
-        else axis
+        replace(axis, dimension=CASE, values=next(columns)) if axis.drawn_from is not None else axis
         for axis in axes
     )
 
 
-def _points(n_range: int, sample: Sample) -> Points:
-    """Points in the unit cube, (n_case, n_range)."""
+def _points(n_range: int, sample: Sample, n: int) -> Points:
+    """Points in the unit cube, (n_case, n_range); of Saltelli's design n base points."""
     if sample.is_saltelli:
         from SALib.sample import sobol
 
         cube = {"num_vars": n_range, "names": list(range(n_range)), "bounds": [[0.0, 1.0]] * n_range}
-        design = sobol.sample(cube, sample.n, calc_second_order=False, seed=sample.seed)
+        design = sobol.sample(cube, n, calc_second_order=False, seed=sample.seed)
         return np.asarray(design, dtype=np.float64)
     random = np.random.default_rng(sample.seed)
     if sample.method == "random":
-        return random.random((sample.n, n_range))
+        return random.random((n, n_range))
     from scipy.stats import qmc
 
     if sample.method == "lhs":
-        return np.asarray(qmc.LatinHypercube(n_range, seed=random).random(sample.n), dtype=np.float64)
+        return np.asarray(qmc.LatinHypercube(n_range, seed=random).random(n), dtype=np.float64)
     # The sequence is drawn up to a power of two, as it is meant to be; what n leaves of it is its beginning.
-    whole = qmc.Sobol(n_range, seed=random).random_base2((sample.n - 1).bit_length())
-    return np.asarray(whole[: sample.n], dtype=np.float64)
+    whole = qmc.Sobol(n_range, seed=random).random_base2((n - 1).bit_length())
+    return np.asarray(whole[:n], dtype=np.float64)

@@ -39,7 +39,7 @@ from rubhpc.study.refine import Refine
 from rubhpc.study.run_up_keys import RunUpKeys, check_run_up, refuse_speeds, speed_axis
 from rubhpc.study.sampling import draw
 from rubhpc.study.state_of_case import with_state
-from rubhpc.study.tables import Integrator, Recording, Run, Sample, check_bent
+from rubhpc.study.tables import Integrator, Recording, Run, Sample, check_method
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -124,7 +124,7 @@ def read_axes(
         )
     axes = [(make_range if isinstance(v, dict) else make_axis)(name, v, rig, file) for name, v in pairs]
     try:
-        return draw(axes, sample)
+        return draw(axes, sample, rig)
     except InputError as error:
         raise InputError(f"{place(file)}: {error}") from None
 
@@ -324,9 +324,8 @@ class Study:
                 is_bent=self.has_bent_stator,
             )
         check_rigs(self.rig, self.axes, self.recording.probe)
-        if self.has_bent_stator:
-            for contact in contacts:
-                check_bent(contact, self.integrator)
+        for contact in contacts:
+            check_method(contact, self.integrator, is_bent=self.has_bent_stator)
 
     @property
     def has_bent_stator(self) -> bool:
@@ -369,7 +368,7 @@ class Study:
                 for axis in self.axes
                 if axis.name != DIRECTION and not (self.changes_speed and axis.name in SPEED_AXES)
             },
-            **({"sample": asdict(self.sample)} if self.sample else {}),
+            **({"sample": self.sample.as_dict()} if self.sample else {}),
             **({"branch": asdict(self.branch)} if self.branch else {}),
             **({"run_up": asdict(self.run_up)} if self.run_up else {}),
             **({"drive": asdict(self.drive)} if self.drive else {}),

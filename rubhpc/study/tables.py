@@ -21,6 +21,7 @@ PAPER_STEP = 0.5e-6  # s
 SAFE_SHARE = 0.9  # of the stability limit
 SEARCH_STEP = 1e-6  # s, of the modal scheme with the fixed normal
 SALTELLI, FEWEST_POINTS = "sobol", 8  # the design that Sobol' indices need
+_IN_SEQUENCE = ("sobol-sequence", "random")  # methods that draw one point after the other
 TURNING_STEP = 0.25e-6  # s, where it takes short steps of contact
 
 
@@ -71,25 +72,23 @@ class Integrator:
         return self.step if self.step is not None else min(PAPER_STEP, SAFE_SHARE * limit)
 
 
-def check_bent(contact: Contact, integrator: Integrator) -> None:
-    """Refuse laws and integrators that do not know a stator of second-order geometry.
+def check_method(contact: Contact, integrator: Integrator, *, is_bent: bool = False) -> None:
+    """Refuse what the central difference does not know: second-order stators and Hertz's law.
 
     Raises
     ------
     InputError
         Says what it needs instead.
     """
-    if integrator.method != "modal":
+    if integrator.method == "modal":
+        return
+    if is_bent:
         problem = f"{integrator.method} needs stators of linear geometry"
         fix = 'add [contact] model = "mokhtar2017", or [override] "stator.geometry" = "linear"'
         raise InputError(f"[integrator] method: {problem}; {fix}")
-    needed = {
-        '[contact] law = "lagrange"': contact.law == "lagrange",
-        '[contact] friction_law = "sliding"': contact.friction_law == "sliding",
-    }
-    for text, is_met in needed.items():
-        if not is_met:
-            raise InputError(f'[stator] geometry: second_order needs {text}; set it, or geometry = "linear"')
+    if contact.law == "hertz":
+        problem = f'{integrator.method} does not know law = "hertz"'
+        raise InputError(f'[integrator] method: {problem}; set law = "penalty", or method = "modal"')
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -210,6 +209,14 @@ class Sample:
         default=1,
         at_least=0,
     )
+    rub_share: float | None = quantity(
+        "",
+        doc="Share of cases whose contact-free motion would reach a stator; for sobol-sequence and random.",
+        example="0.5",
+        default=None,
+        above=0,
+        below=1,
+    )
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -221,6 +228,14 @@ class Sample:
             problem = f"{self.n} is not a power of two, without which Sobol' points lose their balance"
             fix = f'write {near // 2} or {near}, or set method = "sobol-sequence"'
             raise FieldError("n", f"{problem}; {fix}")
+
+        if self.rub_share is not None and self.method not in _IN_SEQUENCE:
+            fix = 'set method = "sobol-sequence" or "random"'
+            raise FieldError("rub_share", f"has no effect on the points of {self.method}; {fix}")
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the keys for JSON; `rub_share` only where it is given: older stores have none."""
+        return {key: value for key, value in asdict(self).items() if value is not None}
 
     @property
     def is_saltelli(self) -> bool:

@@ -43,7 +43,7 @@ ISHIGAMI = np.array([[_V1, _V2, 0], [_V1 + _V13, _V2, _V13]]) / (_V1 + _V2 + _V1
 def sample_of_sines(n: int, seed: int = 1, ranges: dict[str, dict[str, Any]] = RANGES) -> xr.Dataset:
     """A store of a sampled study, its peak torsion the Ishigami function of the first three ranges."""
     rig = read_rig("mokhtar2017")
-    axes = draw([make_range(name, t, rig) for name, t in ranges.items()], Sample(n=n, seed=seed))
+    axes = draw([make_range(name, t, rig) for name, t in ranges.items()], Sample(n=n, seed=seed), rig)
     friction, modulus, clearance = (np.array(axis.values) for axis in axes[:3])
     shares = np.stack([friction, np.log10(modulus / 1e9) / 2, (clearance - 0.5) / 0.4], axis=-1)
     values = Ishigami.evaluate(np.pi * (2 * shares - 1))

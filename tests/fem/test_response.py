@@ -12,13 +12,15 @@ from rubhpc.fem.assemble import assemble
 from rubhpc.fem.modes import modes
 from rubhpc.fem.response import (
     contact_free_amplitude,
+    contact_free_reach,
     first_lateral_frequency,
     steady_response,
     step_limit,
 )
 from rubhpc.rig.parts import Bearing, Damping, Disc, ShaftSection
 from rubhpc.rig.rig import Rig
-from rubhpc.rig.rotors import Rotor, Unbalance
+from rubhpc.rig.rotors import Load, Rotor, Unbalance
+from rubhpc.rig.stators import LumpedStator
 
 # all but rigid and massless: a mass on two bearings
 RIGID = ShaftSection(
@@ -207,3 +209,25 @@ def test_step_limit_is_that_of_the_stiffest_body():
     # without stator only the rotor counts, whose mesh ends about 62 kHz
     bare = assemble(replace(rig, stator=()))
     assert 1 / (math.pi * step_limit(bare)) == pytest.approx(62e3, rel=0.02)
+
+
+def test_the_reach_is_the_clearance_at_which_the_orbit_meets_a_stator():
+    """Against the orbit itself, point by point about the sagged shaft; the lower stator is farther away."""
+    rig = uneven()
+    stators = tuple(
+        LumpedStator(node=4, angle=angle, radius=0.05, mass=0.1, stiffness=1e6, clearance_offset=offset)
+        for angle, offset in ((0.6, 0.0), (math.pi, 3e-6))
+    )
+    spin = 700.0
+    reaches = []
+    for load in (0.0, -60.0):
+        rotor = replace(rig.rotor, load=(Load(node=4, vertical=load),))
+        model = assemble(replace(rig, rotor=rotor, stator=stators))
+        rows = [model.rotor.index(4, name) for name in ("v", "w")]
+        turns = np.exp(1j * np.linspace(0, 2 * math.pi, 20001))
+        v, w = ((steady_response(model, spin)[row] * turns).real + model.sag[row] for row in rows)
+        gaps = [o - (v * math.cos(a) + w * math.sin(a)).max() for a, o in ((0.6, 0.0), (math.pi, 3e-6))]
+        reaches.append((-gaps[0], -gaps[1]))
+        assert contact_free_reach(model, spin) == pytest.approx(max(reaches[-1]), rel=1e-6)
+    assert reaches[0][0] > reaches[0][1]  # without the load the upper stator is met first, with it the lower
+    assert reaches[1][1] > reaches[1][0]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from calling import interpreted
 from closed_form import Contact
-from exponential import expm
 from scipy.integrate import quad
+from scipy.linalg import expm
 from trial_rig import trial_rig
 
 from rubhpc import State

@@ -21,7 +21,7 @@ from rubhpc.errors import InputError
 from rubhpc.integrate.branches import case
 from rubhpc.running.plan import make_plan
 from rubhpc.running.progress import Progress
-from rubhpc.running.sampled_cases import CaseTimer, Enough
+from rubhpc.running.sampled_cases import Enough, Trail
 from rubhpc.study.study import read_study
 
 STUDY = """
@@ -249,23 +249,18 @@ def test_plan_predicts_branches_from_how_far_the_first_has_come(tmp_path, monkey
     (tmp_path / "study.toml").write_text(STUDY)
     shares = []
     for most in (8, 12):
-        began: list[int] = []
 
-        def limit(self, seconds, began=began, most=most):
-            began.clear()
-
-            def check():
-                began.append(1)
-                if len(began) == most:
+        class Cut(list):
+            def append(self, value, most=most):
+                super().append(value)
+                if len(self) == most:
                     raise Enough
 
-            return check
-
-        monkeypatch.setattr(CaseTimer, "_limit", limit)
+        monkeypatch.setattr(Trail, "begin", lambda trail, cut=Cut: setattr(trail, "noted", cut()))
         plan = make_plan(read_study(tmp_path / "study.toml", tmp_path / f"{most}.zarr"))
         assert "at least" not in plan.text()
         assert re.search(r"\(\d.* to \d.* on one core\)", plan.text())
-        first = plan.sample.cases[0]
-        assert first.rest == pytest.approx(first.spent * (2.0 / first.share - 1.0))
+        first = plan.sample.batches[0]
+        assert first.whole == pytest.approx(first.spent / first.share)
         shares.append(first.share)
     assert 0.0 < shares[0] < shares[1] < 1.0

@@ -18,7 +18,7 @@ from rubhpc.errors import InputError, StoppedEarly, StoreError
 from rubhpc.running import case_setup, job, worker
 from rubhpc.running.driver import run
 from rubhpc.running.plan import make_plan
-from rubhpc.running.plan_estimate import Estimate
+from rubhpc.running.sampled_cases import Estimate, Sample
 from rubhpc.schema import MISSING
 from rubhpc.storage.in_progress import InProgress
 from rubhpc.storage.lock import read_holder
@@ -317,9 +317,8 @@ def test_status_and_plan_show_the_parts(physics, tmp_path, monkeypatch):
     assert "no run is active" not in text
     assert sum(part.n_case for part in status.parts) == 28
     assert sum(part.n_missing for part in status.parts) == status.counts[MISSING]
-    monkeypatch.setattr(
-        "rubhpc.running.plan_estimate.Cost.estimate", lambda cost: Estimate(*[1e-3 * cost.steps] * 3)
-    )
+    monkeypatch.setattr(Sample, "estimate", lambda _, __, steps: Estimate(*[steps] * 3))
+    monkeypatch.setattr(Sample, "set_up", 0.0)
     plans = [make_plan(study, f"{number}/4") for number in range(1, 5)]
     assert [plan.counts[MISSING] == 0 for plan in plans] == [False, True, False, False]
     assert sum(plan.core_hours for plan in plans) == pytest.approx(make_plan(study).core_hours)

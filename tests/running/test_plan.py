@@ -2,19 +2,18 @@
 
 import math
 import time
+from dataclasses import replace
+from itertools import groupby
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from rubhpc.running import plan, sampled_cases
-from rubhpc.running.case_setup import MOST_BYTES, Preparations
+from rubhpc.running.case_setup import MOST_BYTES
 from rubhpc.running.plan import make_plan
-from rubhpc.running.plan_estimate import Timed, estimate
-from rubhpc.running.sampled_cases import CaseTimer, Sample, Trail, memory, part_of, peak_memory, spread
-from rubhpc.schema import FAILED
+from rubhpc.running.sampled_cases import CaseTimer, Sample, Timed, Trail, in_spread_order, memory, part_of
 from rubhpc.storage.duration import span
-from rubhpc.storage.new_manifest import manifest_of
 from rubhpc.study.cases import CaseGrid
 from rubhpc.study.speed_law import SpeedLaw
 from rubhpc.study.study import read_study
@@ -22,7 +21,11 @@ from tests.support.running import write_study
 
 
 def timed(steps, spent, **more):
-    return Timed(**{"steps": steps, "spent": spent, "is_whole": True} | more)
+    return Timed(steps=steps, spent=spent, **more)
+
+
+def estimate(batches, n_case, steps):
+    return Sample(batches=batches).estimate(n_case, steps)
 
 
 def test_all_cases_timed_leave_no_error():
@@ -60,10 +63,10 @@ def test_one_case_of_many_gives_a_wide_range():
 
 def test_a_cut_case_widens_the_range():
     """It holds the case whose rest takes least, and the one whose rest takes most."""
-    cut = timed(1.0, 2.0, is_whole=False, share=0.1, rest=18.0, least=6.0, most=54.0)
+    cut = timed(1.0, 2.0, share=0.1, rest=18.0, least=6.0, most=54.0)
     found = estimate([cut], 1, 1.0)
     assert found == pytest.approx((20.0, 8.0, 56.0))
-    unknown = timed(1.0, 2.0, is_whole=False, share=0.0, most=math.inf)
+    unknown = timed(1.0, 2.0, share=0.0, most=math.inf)
     assert estimate([unknown], 1, 1.0).most == math.inf
     assert estimate([unknown, cut], 2, 2.0).most < math.inf
     assert all(math.isnan(value) for value in estimate([], 1, 1.0))
@@ -71,7 +74,7 @@ def test_a_cut_case_widens_the_range():
 
 @pytest.mark.parametrize("shape", [(7,), (40, 4), (10, 10, 10)])
 def test_sampled_cases_spread_over_all_axes(shape):
-    found = list(spread(np.ones(shape, bool), 64))
+    found = list(in_spread_order(np.ones(shape, bool)))[:64]
     assert len(found) == len(set(found)) == min(64, math.prod(shape))
     for axis, n in enumerate(shape):
         seen = np.bincount([index[axis] for index in found], minlength=n)
@@ -81,7 +84,7 @@ def test_sampled_cases_spread_over_all_axes(shape):
 def test_only_missing_cases_are_sampled():
     missing = np.zeros((4, 30, 3), bool)
     missing[-1, ::5, 0] = True
-    assert sorted(spread(missing, 64)) == [tuple(index) for index in np.argwhere(missing).tolist()]
+    assert sorted(in_spread_order(missing)) == [tuple(index) for index in np.argwhere(missing).tolist()]
 
 
 def test_part_of_a_run_up_has_its_speeds():
@@ -98,8 +101,8 @@ def test_a_long_run_up_is_known_by_parts_of_it(tmp_path, monkeypatch):
     grid = '[grid]\n"run_up.time" = [10.0, 11.0]\nclearance = [1e-4, 2e-4]\nfriction = 0.1\n'
     (tmp_path / "up.toml").write_text(f'rig = "mokhtar2017"\n{run_up}{grid}')
     sample, _ = physics.plan(read_study(tmp_path / "up.toml"), 100.0)
-    found = estimate(sample.cases, 4, 4.0)
-    assert [case.is_whole for case in sample.cases].count(True) < 4
+    found = estimate(sample.batches, 4, 4.0)
+    assert sample.cut
     assert found.least < 4 * 0.5 * 80.0 < found.most
 
 
@@ -111,7 +114,7 @@ class Physics:
         clock = SimpleNamespace(monotonic=lambda: self.now, process_time=lambda: self.now)
         monkeypatch.setattr(sampled_cases, "time", clock)
         monkeypatch.setattr(sampled_cases, "memory", lambda: self.held)
-        monkeypatch.setattr(CaseTimer, "_load_kernels", lambda *_: None)
+        monkeypatch.setattr(sampled_cases, "warm_up", lambda *_: None)
         monkeypatch.setattr(sampled_cases, "record_of", self._run)
         self._seconds = seconds
 
@@ -126,10 +129,15 @@ class Physics:
 
     def plan(self, study, seconds=10.0):
         grid = CaseGrid(study)
-        timer = CaseTimer(grid, self.now + seconds)
+        timer = self.timer = CaseTimer(grid, self.now + seconds)
         began = self.now
-        sample = timer.time_cases(np.ones(grid.shape, bool), lambda _: 1.0, lambda _: None)
+        sample = time_all(timer, grid)
         return sample, self.now - began
+
+
+def time_all(timer, grid):
+    """Time cases of a grid of equal steps of which none is done."""
+    return timer.time_cases(np.ones(grid.shape, bool), grid.n_case, lambda _: 1.0, lambda _: None)
 
 
 @pytest.fixture
@@ -138,17 +146,26 @@ def study(tmp_path):
     return read_study(write_study(tmp_path, speed_ratio=speeds))
 
 
-@pytest.mark.parametrize(("seconds", "n_case"), [(1.0, 6), (0.01, 200)])
+@pytest.mark.parametrize(("seconds", "n_case"), [(1.0, 6), (0.01, 240)])
 def test_few_cases_are_timed_where_they_agree(study, monkeypatch, seconds, n_case):
     sample, _ = Physics(monkeypatch, lambda case: seconds).plan(study)
-    assert len(sample.cases) == n_case
-    assert all(case.is_whole for case in sample.cases)
+    assert n_case <= sample.n_case < n_case + 8
+    assert not sample.cut
+
+
+def test_cases_of_a_batch_share_set_up_and_friction(study, monkeypatch):
+    """Contact modes of a speed and a friction are solved once in a run."""
+    physics = Physics(monkeypatch, lambda case: 0.1)
+    physics.plan(study)
+    pairs = [(speed, friction) for speed, _, friction in physics.ran]
+    assert len(set(pairs)) > 10
+    assert len(list(groupby(pairs))) == len(set(pairs))
 
 
 def test_more_cases_are_timed_where_they_differ(study, monkeypatch):
     """A few cases rub and take most of the time."""
     sample, taken = Physics(monkeypatch, lambda case: 0.05 + (case.index[0] % 5 == 0)).plan(study)
-    assert len(sample.cases) > 6
+    assert sample.n_case > 6
     assert taken <= 10.5
 
 
@@ -156,15 +173,15 @@ def test_long_cases_are_cut_and_extrapolated(study, monkeypatch):
     """Their time is known by how far they came, and the plan ends when it should."""
     sample, taken = Physics(monkeypatch, lambda case: 600.0).plan(study)
     assert taken < 10.0 + 6.0 + 1.0  # a check is 6 s apart here
-    assert not any(case.is_whole for case in sample.cases)
-    found = estimate(sample.cases, 240, 240.0)
+    assert len(sample.cut) == sample.n_case
+    found = estimate(sample.batches, 240, 240.0)
     assert found.least < 240 * 600.0 < found.most
     assert found.seconds == pytest.approx(240 * 600.0, rel=0.5)
 
 
 def test_a_case_is_cut_for_its_memory(study, monkeypatch):
     physics = Physics(monkeypatch, lambda case: 1.0)
-    physics.held = 2 * sampled_cases.MOST_BYTES
+    physics.held = 2 * sampled_cases.MOST_MEMORY
     sample, taken = physics.plan(study)
     assert sample.was_full
     assert taken < 0.1
@@ -177,70 +194,68 @@ def test_a_set_up_without_checks_is_cut(study, monkeypatch):
         time.sleep(60.0)
 
     monkeypatch.setattr(sampled_cases.KeptSetups, "of", hang)
-    monkeypatch.setattr(CaseTimer, "_load_kernels", lambda *_: None)
+    monkeypatch.setattr(sampled_cases, "warm_up", lambda *_: None)
     grid, began = CaseGrid(study), time.monotonic()
     timer = CaseTimer(grid, began + 2.0)  # s, time enough to begin a case on a loaded machine
-    sample = timer.time_cases(np.ones(grid.shape, bool), lambda _: 1.0, lambda _: None)
+    sample = time_all(timer, grid)
     assert time.monotonic() - began < 10.0
-    assert [case.share for case in sample.cases] == [0.0]
+    assert sample.cut == [0.0]
 
 
-def trail_of(study, monkeypatch, rows):
-    """A trail of a case whose times, revolutions and contact modes are known."""
-    case = CaseGrid(study).case((0, 0, 0))
-    monkeypatch.setattr(sampled_cases, "n_followed", lambda: 0)
-    made = Trail(study, case)
-    made.rows = rows
-    monkeypatch.setattr(made, "enter", lambda: None)
-    return made
-
-
-def test_the_rest_takes_as_long_as_the_last_half(tmp_path, monkeypatch):
-    """The revolutions before the first contact are the cheapest."""
-    study = read_study(write_study(tmp_path, transient=60, revolutions=4))
-    rows = [(0.0, 0.0, 0), (0.1, 8.0, 0), (1.7, 16.0, 0)]
-    found = trail_of(study, monkeypatch, rows).timed(1.0, is_whole=False)
-    assert (found.spent, found.share) == (1.7, 0.25)
-    assert found.rest == pytest.approx(48 * 0.2)
-    assert found.least < found.rest < found.most
-
-
-def test_contact_modes_grow_with_the_logarithm_of_the_revolutions(tmp_path, monkeypatch):
-    """The last doubling met 20, and two more are to come; a revolution takes 0.1 s, a mode 0.05 s."""
-    study = read_study(write_study(tmp_path, transient=60, revolutions=4))
-    rows = [(0.1 * r + 0.05 * m, float(r), m) for r, m in ((0, 0), (2, 10), (4, 30), (8, 40), (16, 60))]
-    found = trail_of(study, monkeypatch, rows).timed(1.0, is_whole=False)
-    assert found.rest == pytest.approx(48 * 0.1 + 2 * 20 * 0.05)
-    assert found.modes == pytest.approx(0.05 * 100 / (found.spent + found.rest))
+@pytest.mark.parametrize(("revolutions", "share"), [(4, 0.25), (64, 0.8 * 0.25)])
+def test_the_rest_takes_as_long_for_its_share(tmp_path, monkeypatch, revolutions, share):
+    """A fifth of a case with a long record follows a motion that has no period."""
+    study = read_study(write_study(tmp_path, revolutions=revolutions))
+    clock = SimpleNamespace(process_time=lambda: 0.0)
+    monkeypatch.setattr(sampled_cases, "time", clock)
+    trail = Trail(study)
+    trail.begin()
+    trail.noted += [0.1, 0.25, 0.01]  # of another motion that is followed
+    clock.process_time = lambda: 2.0
+    found = trail.timed(1.0, is_whole=False)
+    assert (found.spent, found.share) == (2.0, share)
+    assert found.whole == pytest.approx(2.0 / share)
+    assert 1.5 * found.least < found.rest < found.most / 1.5
+    trail.noted.clear()
+    assert trail.timed(1.0, is_whole=False).most == math.inf
 
 
 def test_plan_says_what_was_cut_and_what_takes_most(tmp_path, monkeypatch):
-    cut = {"is_whole": False, "rest": 900.0, "least": 300.0, "most": 2700.0, "transient": 0.9}
-    cases = [timed(1.0, 100.0, share=share, **cut) for share in (0.1, 0.2)]
-    monkeypatch.setattr(CaseTimer, "time_cases", lambda *_: Sample(cases=cases))
+    cut = {"rest": 900.0, "least": 300.0, "most": 2700.0}
+    batches = [timed(1.0, 100.0, share=share, **cut) for share in (0.1, 0.2)]
+    monkeypatch.setattr(CaseTimer, "time_cases", lambda *_: Sample(batches=batches, cut=[0.1, 0.2]))
     text = make_plan(read_study(write_study(tmp_path, transient=90))).text()
     assert (
-        "timed       2 cases; 2 cut for time at 10 % to 20 % of it, the rest extrapolated; they are few"
+        "timed       2 cases; 2 cut for time at 10 % to 20 % of it, the rest extrapolated; they differ"
         in text
     )
-    assert "mostly      the transient, 90 revolutions (90 % of the time)" in text
+    assert "mostly      the transient, 90 revolutions (98 % of the time)" in text
 
 
-def test_memory_holds_other_set_ups_of_a_ring(monkeypatch):
+def test_half_of_the_stators_is_timed(study, monkeypatch):
+    physics = Physics(monkeypatch, lambda case: 10.0 * len(case.rig.stator) ** 2)
+    physics.plan(replace(study, rig=replace(study.rig, stator=8 * study.rig.stator)))
+    assert physics.timer.time_half(30.0) == pytest.approx(0.25, rel=0.1)
+
+
+def test_memory_holds_other_set_ups_of_a_ring(tmp_path, monkeypatch):
     """Contact modes of the longest case and of other set-ups and frictions, up to a bound."""
-    monkeypatch.setattr(plan, "peak_memory", lambda: 1e6)
+    monkeypatch.setattr(plan, "memory", lambda _: 1e6)
+    study = read_study(write_study(tmp_path))
+    ring = replace(study, rig=replace(study.rig, stator=2 * study.rig.stator))
 
-    def found(*modes):
-        cases = [timed(1.0, 1.0, n_byte=n_byte) for n_byte in modes]
-        return plan._memory(Sample(cases=cases, memory=3e8), Preparations(2, 6)) - 3e8
+    def found(study, *modes):
+        batches = [timed(1.0, 1.0, n_byte=n_byte) for n_byte in modes]
+        return plan._memory(study, Sample(batches=batches, memory=3e8), 100) - 3e8
 
-    assert found(1e6, 3e6) == pytest.approx(plan._ROOM * (3e6 + 5 * 2e6))
-    assert found(1e9) == pytest.approx(plan._ROOM * (1e9 + MOST_BYTES))
+    assert found(study, 1e6, 3e6) == pytest.approx(3e6)
+    assert found(ring, 1e6, 3e6) == pytest.approx(3e6 + 11 * 2e6)  # four set-ups of three frictions
+    assert found(ring, 1e9) == pytest.approx(1e9 + MOST_BYTES)
 
 
 def test_memory_is_that_of_this_process():
     held = np.ones(20_000_000)
-    assert held.nbytes < memory() <= 1.01 * peak_memory() < 1e12
+    assert held.nbytes < memory() <= 1.01 * memory("VmHWM:") < 1e12
 
 
 @pytest.mark.parametrize(
@@ -249,22 +264,3 @@ def test_memory_is_that_of_this_process():
 )
 def test_span_of_time_has_one_unit(least, most, text):
     assert span(least, most) == text
-
-
-def test_a_block_is_timed_with_its_folders(tmp_path, monkeypatch):
-    """Files of a small store lie in folders of their own, which take longer to make than the files."""
-    grid = CaseGrid(read_study(write_study(tmp_path)))
-    manifest = manifest_of(grid)
-    written, flushed = [], []
-    record = SimpleNamespace(status=FAILED)
-
-    def write_whole(path, data, *, is_synced):
-        written.append(path)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(data)
-
-    monkeypatch.setattr(sampled_cases, "write_whole", write_whole)
-    monkeypatch.setattr(sampled_cases, "flush_to_disk", flushed.append)
-    assert sampled_cases.time_block(manifest, record) > 0.0
-    assert written == flushed
-    assert len({path.parent for path in written}) == len(written)  # each in a new one

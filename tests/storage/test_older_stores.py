@@ -47,7 +47,7 @@ def older(tmp_path, monkeypatch):
     monkeypatch.setattr(models, "NORMAL", "updated")
     monkeypatch.setattr(models, "FRICTION_LAW", "coulomb")
     monkeypatch.setattr(models, "GEOMETRY", "second_order")
-    monkeypatch.setattr(rubhpc.study.study, "check_bent", lambda contact, integrator: None)
+    monkeypatch.setattr(rubhpc.study.study, "check_method", lambda contact, integrator, *, is_bent: None)
     return study.output
 
 

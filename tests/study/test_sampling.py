@@ -60,7 +60,7 @@ def test_each_case_has_the_speed_and_the_rig_of_its_row(tmp_path):
         make_axis(name, value, base.rig) for name, value in {"clearance_ratio": 0.7, "friction": 0.3}.items()
     ]
     sample = Sample(n=8)
-    study = replace(base, axes=draw([*axes, *fixed], sample), sample=sample)
+    study = replace(base, axes=draw([*axes, *fixed], sample, base.rig), sample=sample)
     case_grid = CaseGrid(study)
     assert case_grid.dims == ("case", "clearance_ratio", "friction")
     for i in (0, 1, 13, 39):
@@ -236,3 +236,51 @@ def test_a_sample_needs_a_range(tmp_path):
         InputError, match=r"no axis of \[grid\] is a range; write a \{ start, stop \}, or leave"
     ):
         read_study(path)
+
+
+def with_share(tmp_path, n, method="sobol-sequence", share=0.4, **changes):
+    """A sample of clearance ratios up to 3, of a speed, and of nothing else."""
+    sampled = f'[sample]\nn = {n}\nmethod = "{method}"\nrub_share = {share}'
+    axes = {"clearance_ratio": "{ start = 0.8, stop = 3 }", "friction": 0.3} | changes
+    return write_sample(tmp_path, run=sampled, **axes)
+
+
+@pytest.mark.parametrize("method", ["sobol-sequence", "random"])
+def test_a_share_of_the_cases_would_touch(tmp_path, method):
+    """A circular orbit about a stator reaches it below a clearance ratio of 1, and only there."""
+    few, many = (read_study(with_share(tmp_path, n, method)) for n in (13, 40))
+    ratios = np.array(many.axis("clearance_ratio").values)
+    assert np.cumsum(ratios < 1).tolist() == [int(0.4 * (k + 1)) for k in range(40)]
+    for axis in many.axes:
+        assert axis.values[:13] == few.axis(axis.name).values[: len(axis.values)]
+    assert max(ratios) > 2.5
+    assert CaseGrid(few).identity == CaseGrid(many).identity
+    assert many.as_dict()["sample"]["rub_share"] == 0.4
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        (
+            {"method": "lhs"},
+            '[sample] rub_share: has no effect on the points of lhs; set method = "sobol-seq',
+        ),
+        ({"share": 1.0}, "[sample] rub_share: 1 is out of range; it must be below 1"),
+        (
+            {"clearance_ratio": [0.7, 1.2]},
+            "[sample] rub_share: clearance_ratio has 2 values, at each of which",
+        ),
+        (
+            {"clearance_ratio": 1.2},
+            "rub_share: 0 of 640 drawn cases reach a stator, 4 are needed; take smaller",
+        ),
+        (
+            {"clearance_ratio": 0.7},
+            "0 of 640 drawn cases stay clear of the stators, 6 are needed; take larger",
+        ),
+    ],
+)
+def test_a_share_that_cannot_be_is_refused(tmp_path, changes, says):
+    with pytest.raises(InputError) as refused:
+        read_study(with_share(tmp_path, 10, **changes))
+    assert says in str(refused.value)

@@ -126,7 +126,7 @@ def other_defaults(monkeypatch):
     monkeypatch.setattr(models, "NORMAL", "updated")
     monkeypatch.setattr(models, "FRICTION_LAW", "coulomb")
     monkeypatch.setattr(models, "GEOMETRY", "second_order")
-    monkeypatch.setattr("rubhpc.study.study.check_bent", lambda contact, integrator: None)
+    monkeypatch.setattr("rubhpc.study.study.check_method", lambda contact, integrator, *, is_bent: None)
 
 
 def test_one_place_holds_the_defaults(tmp_path, other_defaults):

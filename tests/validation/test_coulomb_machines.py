@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from closed_form import simulate
-from time_stepping import solve
+from independent_contact import run
 from trial_rig import STEEL
 
 from rubhpc import Rig
@@ -101,8 +101,8 @@ def test_ten_revolutions_are_those_of_time_stepping(seed, static_ratio):
     assert usual.stick_fraction.max() > 0.1
     assert usual.left_closed_form == 0
     assert usual.energy_residual < 1e-6
-    args = rig, usual.spin_speed, usual.clearance, case["friction"], REVOLUTIONS, 256
-    coarse, known = (solve(*args, step, static_ratio) for step in (0.5e-6, 0.25e-6))
+    case |= {"speed": usual.spin_speed, "clearance": usual.clearance, "samples_per_revolution": 256}
+    coarse, known = (run(rig, given | case, step) for step in (0.5e-6, 0.1e-6))
     halved = max(distance(coarse[name], known[name], name) for name in SIGNALS)
     exact = max(distance(getattr(whole, name), known[name], name) for name in SIGNALS)
     found = max(distance(getattr(usual, name), known[name], name) for name in SIGNALS)

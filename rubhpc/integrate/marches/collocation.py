@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rubhpc.integrate.marches.march import ALL_SAMPLES, NO_FORCES
 from rubhpc.integrate.marches.modal import ModalMarch
-from rubhpc.kernels.case_progress import LONG_AGO, follow, shaft_turn
-from rubhpc.kernels.collocation.march import LEAST_SCALE, advance_by_collocation
+from rubhpc.integrate.measuring.samples import no_record
+from rubhpc.kernels.case_progress import LONG_AGO, PAUSED, follow, restart_clock, shaft_turn
+from rubhpc.kernels.collocation.flight import LEAST_GAP
+from rubhpc.kernels.collocation.march import LEAST_SCALE, SETTLED, advance_by_collocation
 from rubhpc.kernels.collocation.observing import Seen
 from rubhpc.kernels.collocation.structures import FORWARD, NORMAL, OPEN, CaseState, Solution, new_memory
+from rubhpc.kernels.collocation.tangent import FULL as TOO_MANY
+from rubhpc.kernels.collocation.tangent import Trail
 from rubhpc.kernels.sampling import Measured
 
 if TYPE_CHECKING:
@@ -22,6 +27,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.marches.modal import Place
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.record import State
+    from rubhpc.integrate.reduced_model.flight_modes import FlightModes
     from rubhpc.kernels.accumulators import Accumulator, Samples
     from rubhpc.kernels.case_progress import Clock, Progress
     from rubhpc.kernels.sampling import Recorder
@@ -44,7 +50,9 @@ class CollocationMarch(ModalMarch):
         super().__init__(setup, clearance, friction, initial, check)
         self._friction = friction
         self._seen: Seen | None = None
-        self._solution: Solution | None = None
+        self._sizes: tuple[object, ...] = ()
+        self.accuracy = setup.accuracy
+        self.trail: Trail | None = None  # of tangent and events, where one is kept
         self._use_modes(setup)
         self._begin(initial.contact_force)
 
@@ -53,11 +61,11 @@ class CollocationMarch(ModalMarch):
         self._modes = setup.flight_modes
         self._contacts = self._modes.bodies(self._friction, self._clearance)
         sizes = self._modes.tables.free.shape, self._modes.n_local
-        if self._solution is None or sizes != self._sizes:
+        if sizes != self._sizes:
             self._sizes, self._solution, self._seen = sizes, self._new_solution(), None
 
     def _begin(self, contact_force: Floats, turn: tuple[float, float] = (1.0, 0.0)) -> None:
-        """Begin with the motion, at the shaft's `turn`; the contacts that forces (q,), N, press are closed."""
+        """Begin with the motion, at the shaft's `turn`; contacts are closed that forces (q,), N, press."""
         modes, s, q = self._modes, self._modes.nodes.at.size, self._clearance.size
         self._memory = new_memory()
         self._case = CaseState(
@@ -102,6 +110,72 @@ class CollocationMarch(ModalMarch):
         self._begin(state.contact_force)
         return True
 
+    def place_at(self, motion: Floats, states: NDArray[np.int64], tick: int) -> None:
+        """Stand at a tick with a motion (2 n,) and the pairs in their states (q,)."""
+        self._begin_time()
+        self._motion[:] = motion
+        restart_clock(self._bare_progress, tick, 0, is_recorded=False)
+        self._begin((states != OPEN).astype(float), shaft_turn(self.clock, tick))
+        self._case.state[:], self._memory["is_new"] = states, SETTLED
+
+    def carry(
+        self, last_tick: int, columns: Floats, n_event: int, accuracy: float | None = None
+    ) -> tuple[int, Trail]:
+        """Go on to a tick with tangent columns (nx, k) and events: outcome of the kernel, and the trail."""
+        own, self.accuracy = self.accuracy, accuracy or self.accuracy
+        trail = self.new_trail(columns, n_event)
+        self.trail, (samples, accumulator) = trail, self._idle
+        outcome = PAUSED
+        while outcome == PAUSED and not trail.count[TOO_MANY]:
+            outcome = self._kernel(last_tick, samples, accumulator, False)
+            if self.check is not None:
+                self.check()
+        self.trail, self.accuracy = None, own
+        np.minimum(trail.least[0], self._solution.turned[LEAST_GAP], out=trail.least[0])
+        self._solution.turned[LEAST_GAP] = np.inf
+        return outcome, trail
+
+    def keep(self, trail: object) -> None:
+        """Nothing: events are kept where a tangent is carried."""
+
+    def pass_sections(
+        self, n_revolution: int, samples: Samples, accumulator: Accumulator
+    ) -> tuple[Floats, str | None]:
+        """Go on by some revolutions without a record.
+
+        Returns
+        -------
+        (n_revolution, 2 n)
+            The motion at the end of each.
+        str or None
+            Why the case cannot go on.
+        """
+        sections, per_revolution = (
+            np.empty((n_revolution, self._motion.size)),
+            self.clock.samples_per_revolution,
+        )
+        for i in range(n_revolution):
+            first = (i - n_revolution) * per_revolution
+            reason = self.advance(first, first + per_revolution, samples, accumulator, is_recorded=False)
+            if reason is not None:
+                return sections, reason
+            sections[i] = self.motion()
+        return sections, None
+
+    @cached_property
+    def _idle(self) -> tuple[Samples, Accumulator]:
+        return no_record(self.n_place, self._clearance.size)
+
+    @property
+    def modes(self) -> FlightModes:
+        """Flight modes at the present speed."""
+        return self._modes
+
+    @property
+    def states(self) -> NDArray[np.int64]:
+        """State of each pair, (q,)."""
+        return self._case.state.copy()
+
     def take_over(
         self,
         clock: Clock,
@@ -110,7 +184,7 @@ class CollocationMarch(ModalMarch):
         motion: Floats,
         closed: NDArray[np.bool_],
     ) -> None:
-        """Begin at the tick of another march with its motion (2 n,) and closed pairs (q,); continue its record."""
+        """Continue the record of another march at its tick, with its motion (2 n,) and closed pairs (q,)."""
         self.clock, self._recorder = clock, recorder
         follow(self.progress, progress)
         self._motion[:] = motion
@@ -130,7 +204,8 @@ class CollocationMarch(ModalMarch):
 
     def touching(self) -> NDArray[np.bool_]:
         """Whether each pair is closed, (q,)."""
-        return self._case.state != OPEN
+        is_closed: NDArray[np.bool_] = self._case.state != OPEN
+        return is_closed
 
     def _contact_force(self) -> Floats:
         force = self._modes.nodes.power.T @ self._case.force[:, NORMAL].T  # powers
@@ -176,7 +251,10 @@ class CollocationMarch(ModalMarch):
             pushed=zeros((q, 2, s)),
             changed=zeros((s, 6)),
             guess=zeros((q, 2, s)),
+            weight=zeros(s),
             instant=zeros((q, 2)),
+            turned=np.full((3, q), np.inf),
+            looked=zeros(1, dtype=np.int64),
             touching=zeros(q, dtype=np.bool_),
             kept=zeros(q, dtype=np.bool_),
             bound=zeros(q, dtype=np.bool_),
@@ -216,7 +294,7 @@ class CollocationMarch(ModalMarch):
             modes.signals,
             modes.power,
             self.clock,
-            self._setup.accuracy,
+            self.accuracy,
             last_tick,
             is_recorded,
             self._bare_progress,
@@ -224,4 +302,25 @@ class CollocationMarch(ModalMarch):
             self._case,
             self._solution,
             self._seen,
+            self.trail,
+        )
+
+    def new_trail(self, columns: Floats, n_event: int) -> Trail:
+        """Tangent columns (nx, k), and room for events."""
+        modes, q = self._modes, self._clearance.size
+        n_x, s, n_row = self._case.x.size, modes.nodes.at.size, len(modes.local)
+        return Trail(
+            columns=np.array(columns, order="C"),
+            event=np.zeros((n_event, 4), dtype=np.int64),
+            tick=np.zeros(n_event, dtype=np.int64),
+            approach=np.full(n_event + 1, np.nan),
+            count=np.zeros(2, dtype=np.int64),
+            least=np.full((2, q), np.inf),
+            before=np.zeros(n_x),
+            state=np.zeros(q, dtype=np.int64),
+            column=np.zeros(n_x),
+            after=np.zeros(n_x),
+            load=np.zeros(s * n_row),
+            rates=np.zeros((2, n_x)),
+            kick=np.zeros((2 * n_row, n_x)),
         )

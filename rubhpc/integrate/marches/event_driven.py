@@ -41,8 +41,6 @@ MOST_STEPS = 20.0  # of a piece, over those of short steps: with more, its event
 class EventDrivenMarch(ContactSets):
     """A case that goes from one contact mode to another; `NoClosedForm` leaves it to contact stepping."""
 
-    has_closed_form = True  # of its closed contacts
-
     def __init__(
         self,
         setup: ModalSetup,
@@ -74,7 +72,7 @@ class EventDrivenMarch(ContactSets):
         Then a pair that is not `closed` (q,) overlaps at its end by far more than an event leaves.
         """
         bodies, q = self.bodies, self._clearance.size
-        if bodies.spring or not self.has_closed_form:
+        if bodies.spring:
             return False
         gap = bodies.clearance[:q] + bodies.gap_jacobian @ motion[: motion.size // 2]
         deepest = float(gap[~closed].min(initial=0.0))

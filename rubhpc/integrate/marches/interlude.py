@@ -1,4 +1,4 @@
-"""The collocation integrator for a while, where events of the closed form have no end or no forces obey the laws."""
+"""Collocation for a while, where events of the closed form have no end or no forces obey the laws."""
 
 from __future__ import annotations
 

@@ -8,13 +8,13 @@ import numpy as np
 
 from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.periodic_motions.piecewise_motion import Unfollowed
-from rubhpc.integrate.periodic_motions.saltation import carried
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
+    from rubhpc.integrate.periodic_motions.collocated_motion import CollocatedMotion
     from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 
     Floats = NDArray[np.float64]
@@ -23,7 +23,7 @@ ALIGNING, FOLLOWED = 16, 256  # revolutions: to align the displacements, then to
 LOST = 1e-280  # a smaller displacement counts as zero
 
 
-def spectrum_of(begin: Callable[[], PiecewiseMotion], n_exponent: int) -> dict[str, float]:
+def spectrum_of(begin: Callable[[], PiecewiseMotion | CollocatedMotion], n_exponent: int) -> dict[str, float]:
     """Measures `lyapunov_1`, ... and `kaplan_yorke_dimension` of the motion from where a case stands.
 
     Parameters
@@ -47,7 +47,11 @@ def spectrum_of(begin: Callable[[], PiecewiseMotion], n_exponent: int) -> dict[s
 
 
 def exponents(
-    piecewise: PiecewiseMotion, n_exponent: int, *, aligning: int = ALIGNING, followed: int = FOLLOWED
+    piecewise: PiecewiseMotion | CollocatedMotion,
+    n_exponent: int,
+    *,
+    aligning: int = ALIGNING,
+    followed: int = FOLLOWED,
 ) -> Floats:
     """The largest Lyapunov exponents per revolution, (n_exponent,), largest first.
 
@@ -67,9 +71,8 @@ def exponents(
     motion, states = piecewise.start, piecewise.states
     grown = np.zeros(n_exponent)
     for i_revolution in range(aligning + followed):
-        revolution = piecewise.revolve(motion, states)
-        columns, triangle = np.linalg.qr(weight * carried(piecewise, revolution.rows, columns / weight))
-        motion, states = revolution.end, revolution.states
+        motion, states, moved = piecewise.revolve_with(motion, states, columns / weight)
+        columns, triangle = np.linalg.qr(weight * moved)
         if i_revolution >= aligning:
             size = np.abs(np.diag(triangle))
             with np.errstate(divide="ignore"):

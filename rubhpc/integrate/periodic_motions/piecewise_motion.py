@@ -19,6 +19,7 @@ from rubhpc.integrate.periodic_motions.revolution import (
     longer,
     whole_revolutions,
 )
+from rubhpc.integrate.periodic_motions.saltation import carried, monodromy
 from rubhpc.kernels.flow import Timing, piece_room
 from rubhpc.kernels.friction_states import STUCK, state_of
 from rubhpc.kernels.revolutions import (
@@ -41,6 +42,8 @@ from rubhpc.kernels.revolutions import (
 from rubhpc.kernels.small_changes import ChangeRoom, change_room
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rubhpc.integrate.marches.event_driven import EventDrivenMarch
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.record import State
@@ -247,6 +250,15 @@ class PiecewiseMotion:
             raise Unfollowed(self.why_unfollowed(UNSOLVED, 0))
         rows.motions[k, AFTER], rows.given[k] = motion, self.march.given
         rows.states[k, 3] = reached[STATES] = after
+
+    def monodromy(self, revolutions: Sequence[Revolution]) -> Floats:
+        """Derivative (2 n, 2 n) of a motion's end by its beginning."""
+        return monodromy(self, revolutions)
+
+    def revolve_with(self, motion: Floats, states: int, columns: Floats) -> tuple[Floats, int, Floats]:
+        """Motion and states after a revolution, and what small changes (2 n, k) of the beginning become."""
+        revolution = self.revolve(motion, states)
+        return revolution.end, revolution.states, carried(self, revolution.rows, columns)
 
     def change_room(self, k: int) -> ChangeRoom:
         """Room in which k small changes are carried; the same each time."""

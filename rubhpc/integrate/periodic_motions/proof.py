@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.integrate.lyapunov import count_followed
-from rubhpc.integrate.marches.closed_form import closed_form_march
 from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.measuring.orbit_measures import PERIOD_TOLERANCE, closest_return
 from rubhpc.integrate.measuring.regimes import MOST_DOUBLED, MOST_EVENTS, Solution
 from rubhpc.integrate.packing import output_degrees
-from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
+from rubhpc.integrate.periodic_motions.collocated_motion import followed_motion
 from rubhpc.integrate.periodic_motions.shooting import NotConverged, Orbit, shoot
 from rubhpc.integrate.transient import idle_of
 
@@ -23,8 +22,11 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rubhpc.integrate.marches.collocation import CollocationMarch
     from rubhpc.integrate.marches.event_driven import EventDrivenMarch
     from rubhpc.integrate.modal_setup import ModalSetup
+    from rubhpc.integrate.periodic_motions.collocated_motion import CollocatedMotion
+    from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
     from rubhpc.integrate.record import State
 
     Floats = NDArray[np.float64]
@@ -52,11 +54,11 @@ class Solver:
         clearance: float,
         friction: float,
         final: State,
-        march: EventDrivenMarch | None = None,
+        march: EventDrivenMarch | CollocationMarch | None = None,
     ) -> None:
         """Take the end of a case in closed form; a march of it that is needed no more is started again."""
         self._case = setup, clearance, friction, final
-        self._piecewise: PiecewiseMotion | None = None
+        self._piecewise: PiecewiseMotion | CollocatedMotion | None = None
         self._march = march
         self.followed: tuple[Floats, State] | None = None  # energies at revolutions, and the end
 
@@ -69,7 +71,7 @@ class Solver:
         """Return the motion that closes after this many revolutions, or fewer; None where none is found."""
         try:
             if self._piecewise is None:
-                self._piecewise = PiecewiseMotion(*self._case, self._march)
+                self._piecewise = followed_motion(self._case[0])(*self._case, self._march)
         except NoClosedForm:
             return None
         return _solution(self._piecewise, period, MOST_ITERATIONS, LEAST_STEP)
@@ -98,7 +100,7 @@ class Solver:
         energy: list[Floats] = []
         returned: list[float] = []
         try:
-            march = self._march or closed_form_march(setup)(setup, clearance, friction, state, None)
+            march = self._march or followed_motion(setup)(setup, clearance, friction, state).march
             march.keep(None)
             march.start_again(state)
             self._piecewise = None  # it may have followed this march
@@ -116,7 +118,7 @@ class Solver:
                 if apart > NEARER * tried and not draws_near:
                     continue
                 tried, state = apart, march.final()
-                later = PiecewiseMotion(setup, clearance, friction, state)
+                later = followed_motion(setup)(setup, clearance, friction, state)
                 yield period, partial(_solved_later, later, n_on)
                 march.start_again(state)
             self.followed = np.concatenate(energy), march.final()
@@ -125,7 +127,7 @@ class Solver:
 
 
 def _solution(
-    piecewise: PiecewiseMotion, period: int, most_iterations: int, least_step: float
+    piecewise: PiecewiseMotion | CollocatedMotion, period: int, most_iterations: int, least_step: float
 ) -> Solution | None:
     """Motion that closes after a period, or after a divisor of it; None where none is found."""
     try:
@@ -150,7 +152,9 @@ def _solution(
     )
 
 
-def _solved_later(piecewise: PiecewiseMotion, n_revolution: int, period: int) -> Solution | None:
+def _solved_later(
+    piecewise: PiecewiseMotion | CollocatedMotion, n_revolution: int, period: int
+) -> Solution | None:
     """Motion found from so many revolutions behind the end of a record, its section turned back to that."""
     found = _solution(piecewise, period, PATIENT_ITERATIONS, PATIENT_STEP)
     return found and found._replace(section=np.roll(found.section, n_revolution, axis=0))
@@ -181,7 +185,7 @@ def _falls(apart: list[float]) -> bool:
     return apart[-1] <= NEARER * apart[0] and apart[-1] == min(apart)
 
 
-def _section(piecewise: PiecewiseMotion, orbit: Orbit) -> Floats:
+def _section(piecewise: PiecewiseMotion | CollocatedMotion, orbit: Orbit) -> Floats:
     """Displacement of the output node where revolutions begin."""
     setup = piecewise.setup
     rows = output_degrees(setup.model)[:2]

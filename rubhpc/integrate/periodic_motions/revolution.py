@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,7 +106,19 @@ def _piece(stride: int, states: list[int], times: list[float], motions: Floats, 
     )
 
 
-def least_of(revolutions: Iterable[Revolution]) -> tuple[Floats, Floats]:
+class HasLeast(Protocol):
+    """A revolution with the smallest gaps and forces in it."""
+
+    @property
+    def least_gap(self) -> Floats:
+        """Smallest gap of each pair where it turns, (q,), m."""
+
+    @property
+    def least_force(self) -> Floats:
+        """Smallest force of each pair where it turns, (q,), N."""
+
+
+def least_of(revolutions: Iterable[HasLeast]) -> tuple[Floats, Floats]:
     """Smallest gap and force (q,), m and N, of each pair where it turns between events; inf: none."""
     gaps, forces = zip(*((one.least_gap, one.least_force) for one in revolutions), strict=True)
     return np.min(gaps, axis=0), np.min(forces, axis=0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -13,14 +13,31 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
+    from rubhpc.integrate.periodic_motions.piece_mode import Mode
     from rubhpc.integrate.periodic_motions.revolution import Revolution
-    from rubhpc.kernels.revolutions import PieceRows
+    from rubhpc.kernels.contact_modes import Reduced
+    from rubhpc.kernels.revolutions import PieceModes, PieceRows
+    from rubhpc.kernels.small_changes import ChangeRoom
 
     Floats = NDArray[np.float64]
 
 
-def monodromy(motion: PiecewiseMotion, revolutions: Sequence[Revolution]) -> Floats:
+class Followed(Protocol):
+    """A case in closed form, as `piecewise_motion.PiecewiseMotion`."""
+
+    n: int
+    bodies: Reduced
+    known: PieceModes
+    has_states: bool
+
+    def mode(self, states: int) -> Mode:
+        """Contact mode with these states."""
+
+    def change_room(self, k: int) -> ChangeRoom:
+        """Room in which k small changes are carried."""
+
+
+def monodromy(motion: Followed, revolutions: Sequence[Revolution]) -> Floats:
     """Derivative (2 n, 2 n) of a motion's end by its beginning.
 
     The product of `exp(A tau)` over the pieces and of the saltation matrices of the events between.
@@ -31,7 +48,7 @@ def monodromy(motion: PiecewiseMotion, revolutions: Sequence[Revolution]) -> Flo
     return columns
 
 
-def tangents(motion: PiecewiseMotion, revolutions: Sequence[Revolution]) -> list[Floats]:
+def tangents(motion: Followed, revolutions: Sequence[Revolution]) -> list[Floats]:
     """Derivatives (2 n, 2 n) by the beginning, of the motion after each piece and the event that ends it."""
     columns, found = np.eye(2 * motion.n), []
     for revolution in revolutions:
@@ -41,14 +58,14 @@ def tangents(motion: PiecewiseMotion, revolutions: Sequence[Revolution]) -> list
     return found
 
 
-def carried(motion: PiecewiseMotion, rows: PieceRows, columns: Floats) -> Floats:
+def carried(motion: Followed, rows: PieceRows, columns: Floats) -> Floats:
     """What becomes of small changes (2 n, k) of the beginning of some pieces."""
     moved = np.array(columns, order="C")
     _carry(motion, rows, moved, _no_pieces(moved))
     return moved
 
 
-def _carry(motion: PiecewiseMotion, rows: PieceRows, columns: Floats, kept: Floats) -> None:
+def _carry(motion: Followed, rows: PieceRows, columns: Floats, kept: Floats) -> None:
     """Carry small changes through pieces, in place (`kernels.small_changes.carry_pieces`)."""
     piece = 0
     while True:

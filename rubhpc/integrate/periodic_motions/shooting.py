@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rubhpc.integrate.periodic_motions.collocated_motion import CollocatedMotion
 from rubhpc.integrate.periodic_motions.piecewise_motion import (
     FEW_PIECES,
     MOST_EVENTS,
@@ -16,6 +17,7 @@ from rubhpc.integrate.periodic_motions.piecewise_motion import (
     Unfollowed,
 )
 from rubhpc.integrate.periodic_motions.revolution import copied, longer, whole_revolutions
+from rubhpc.integrate.periodic_motions.shooting_by_revolutions import Search
 from rubhpc.kernels.revolutions import (
     AT_EVENT,
     FULL,
@@ -48,11 +50,14 @@ from rubhpc.kernels.shooting import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
+    from rubhpc.integrate.periodic_motions.collocated_motion import CollocatedRevolution
     from rubhpc.integrate.periodic_motions.revolution import Revolution
     from rubhpc.kernels.flow import Timing
-    from rubhpc.kernels.shooting import Search
+    from rubhpc.kernels.shooting import Search as KernelSearch
 
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
@@ -86,7 +91,7 @@ class Orbit:
 
     motion: Floats
     states: int
-    revolutions: tuple[Revolution, ...]
+    revolutions: tuple[Any, ...]
     monodromy: Floats
     residual: float
     iterations: int
@@ -109,7 +114,7 @@ def floquet_multipliers(monodromy: Floats) -> Complexes:
 
 
 def shoot(
-    piecewise: PiecewiseMotion,
+    piecewise: PiecewiseMotion | CollocatedMotion,
     motion: Floats,
     states: int,
     period: int,
@@ -147,6 +152,11 @@ def shoot(
     NotConverged
         No motion was found that closes to 1e-10 of its size.
     """
+    if isinstance(piecewise, CollocatedMotion):
+        given = motion, states, period
+        return _shoot_by_revolutions(
+            piecewise, *given, most_iterations, least_step, most_events, most_residual
+        )
     longest = piecewise.longest if watches_turns else piecewise.highest
     search = new_search(motion.size, most_iterations, least_step, most_residual)
     shot = _Shot(piecewise, motion, states, period, piecewise.timing(longest, most_events), search)
@@ -168,6 +178,40 @@ def shoot(
     raise NotConverged(piecewise.why_unfollowed(outcome, most_events))
 
 
+def _shoot_by_revolutions(
+    followed: CollocatedMotion,
+    motion: Floats,
+    states: int,
+    period: int,
+    most_iterations: int,
+    least_step: float,
+    most_events: int,
+    most_residual: float,
+) -> Orbit:
+    """Search as `shoot` does, for a motion without closed form."""
+    try:
+        search = Search(followed, motion, states, period, most_events)
+        if search.residual > most_residual:
+            raise NotConverged(f"the initial state is far from periodic, residual {search.residual:.2g}")
+        problem = search.run(most_iterations, least_step)
+    except Unfollowed as unfollowed:
+        raise NotConverged(str(unfollowed)) from None
+    if problem:
+        usual = abs(followed.setup.spin * followed.bodies.clearance)
+        grazing = _grazing(search.revolutions, usual)
+        raise NotConverged(f"{problem} at a residual of {search.residual:.2g}{grazing}")
+    search.finish()
+    revolutions = search.revolutions[: search.shortest()]
+    return Orbit(
+        motion=search.motion,
+        states=search.states,
+        revolutions=tuple(revolutions),
+        monodromy=search.monodromy(len(revolutions)),
+        residual=search.residual,
+        iterations=search.iterations,
+    )
+
+
 class _Shot:
     """A search under way: what its kernel works with."""
 
@@ -178,7 +222,7 @@ class _Shot:
         states: int,
         period: int,
         timing: Timing,
-        search: Search,
+        search: KernelSearch,
     ) -> None:
         self._piecewise, self._timing, self.search = piecewise, timing, search
         self._passage = new_passage(motion.size)
@@ -260,7 +304,7 @@ class _Shot:
         )
 
 
-def _grazing(revolutions: list[Revolution], usual: Floats) -> str:
+def _grazing(revolutions: Sequence[Revolution | CollocatedRevolution], usual: Floats) -> str:
     """What a failure has to do with grazing; "" where nothing.
 
     `usual` (q,), m/s, are spin times clearance of each pair. A gap that opens where it is found closed, since

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -17,8 +17,6 @@ from rubhpc.kernels.collocation.structures import (
     ALONG,
     BENDING,
     FIXED,
-    HARD,
-    PENALTY,
     ROUND,
     TWIST,
     Bodies,
@@ -28,14 +26,14 @@ from rubhpc.kernels.collocation.structures import (
 )
 from rubhpc.kernels.contact_modes import LATERAL_RATE, LATERAL_ROW, N_ROTOR_ROW
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, TORSION, V, W, rim_sense
-from rubhpc.kernels.laws import STRIBECK, TABLE, is_set_valued
+from rubhpc.kernels.laws import LAGRANGE, STRIBECK, TABLE, is_set_valued
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model, StatorModel
-    from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
+    from rubhpc.kernels.laws import Law
 
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
@@ -48,6 +46,46 @@ RESTING = 1e-9  # of the largest exponent: smaller sums of two exponents count a
 ENOUGH = 0.3  # of the accuracy: share of the foreshortening that may be missed
 UNBENT = 1e-8  # bending displacement over the largest of a stator; smaller ones count as zero
 UNSEEN = 1e-14  # of the largest: eigenvalues of damping and skew stiffness that are rounding
+
+
+class Settings(Protocol):
+    """What a `modal_setup.ModalSetup` has."""
+
+    @property
+    def model(self) -> Model:
+        """The model."""
+
+    @property
+    def reduced(self) -> ReducedModel:
+        """The same in reduced coordinates."""
+
+    @property
+    def law(self) -> Law:
+        """Laws of contact and friction."""
+
+    @property
+    def is_updated(self) -> bool:
+        """Whether the normal follows the line of centres."""
+
+    @property
+    def spin(self) -> float:
+        """Speed, rad/s."""
+
+    @property
+    def accuracy(self) -> float:
+        """Accuracy asked for."""
+
+    @property
+    def displacement_limit(self) -> float:
+        """Displacement beyond which a motion has diverged, m."""
+
+    @property
+    def tick(self) -> float:
+        """Resolution of events, s."""
+
+    @property
+    def n_level(self) -> int:
+        """Levels for which exponentials are tabulated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +107,7 @@ class FlightModes:
         Motion under it.
     """
 
-    setup: ModalSetup
+    setup: Settings
     eigenvalue: Complexes
     eigenmotion: Complexes
     entry: Complexes
@@ -177,7 +215,7 @@ class FlightModes:
             aside=self.sense * sag_at_stators(setup.model)[1],
             rim_speed=radius * abs(setup.spin),
             friction=np.zeros(q),
-            normal_law=np.full(q, self.normal_law),
+            normal_law=np.full(q, law.normal_law),
             stiffness=np.full(q, law.stiffness),
             damping=np.full(q, law.damping),
             restitution=np.full(q, law.restitution),
@@ -188,15 +226,10 @@ class FlightModes:
             displacement_limit=setup.displacement_limit,
         )
 
-    @property
-    def normal_law(self) -> int:
-        """Law of the normal force."""
-        return PENALTY if self.setup.law.stiffness > 0.0 else HARD
-
     @cached_property
     def nodes(self) -> Nodes:
         """Nodes of a step."""
-        return lobatto_nodes(NODES_HARD if self.normal_law == HARD else NODES_SPRING)
+        return lobatto_nodes(NODES_HARD if self.setup.law.normal_law == LAGRANGE else NODES_SPRING)
 
     @cached_property
     def tables(self) -> Tables:
@@ -222,7 +255,8 @@ class FlightModes:
     def power(self) -> Complexes:
         """Exponentials of the modes over 2^level ticks (n_level, nm)."""
         level = np.arange(self.setup.n_level)
-        return np.exp(np.outer(self.setup.tick * 2.0**level, self.exponent))
+        power: Complexes = np.exp(np.outer(self.setup.tick * 2.0**level, self.exponent))
+        return power
 
     @cached_property
     def signals(self) -> Signals:
@@ -294,7 +328,7 @@ def energy_forms(
     sign: Floats,
     n_loss: int,
 ) -> tuple[Floats, Floats]:
-    """Quadratic forms of the coordinates whose growth in free motion is a work, and those it grows by in time.
+    """Quadratic forms of the coordinates whose growth in flight is a work, and those that grow in time.
 
     A power `x' P x` of modes with the exponents a and b has the primitive `P_ab / (a + b)`; where the sum is
     zero it is constant.

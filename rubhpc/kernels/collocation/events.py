@@ -12,10 +12,8 @@ from rubhpc.kernels.collocation.observing import value_at
 from rubhpc.kernels.collocation.structures import (
     FRICTION,
     GAP,
-    HARD,
     NORMAL,
     OPEN,
-    PENALTY,
     RATE,
     SLIP,
     STICKING,
@@ -24,6 +22,7 @@ from rubhpc.kernels.collocation.structures import (
     Solution,
 )
 from rubhpc.kernels.collocation.tables import rate_row
+from rubhpc.kernels.laws import LAGRANGE, PENALTY
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -31,6 +30,7 @@ Ints = NDArray[np.int64]
 N_LOOK = 16  # parts of a step in which a root is looked for
 MOST_HALVINGS = 60
 NO_ROOT = 2.0
+BREAKING = 0.3  # of the accuracy: friction beyond its bound, of the error of T, at which a pair breaks away
 STILL = 1e-9  # m/s, slip that rounding leaves where a pair begins to slide
 
 
@@ -81,7 +81,7 @@ def root_between(
 def fill_events(
     bodies: Bodies, nodes: Nodes, state: Ints, force: Floats, accuracy: float, solution: Solution
 ) -> None:
-    """Fill the event functions (q, 2, s) at the nodes: positive while a pair keeps its state; unused ones 1."""
+    """Fill the event functions (q, 2, s) at the nodes, positive while a pair keeps its state; 1: unused."""
     s, n_local, n_row, event = nodes.at.size, bodies.n_local, bodies.load.shape[0], solution.event
     for i in range(state.size):
         first = i * n_local
@@ -100,14 +100,14 @@ def fill_events(
                 if bodies.normal_law[i] == PENALTY:
                     event[i, NORMAL, k] += bodies.damping[i] / bodies.stiffness[i] * max(rate, 0.0)
                 continue
-            if bodies.normal_law[i] == HARD:
+            if bodies.normal_law[i] == LAGRANGE:
                 event[i, NORMAL, k] = force[i, NORMAL, k]
             else:
                 event[i, NORMAL, k] = spring_end(bodies, i, solution.seen[row, GAP], solution.seen[row, RATE])
             if not bodies.is_sticky:
                 continue
             if state[i] == STICKING:  # breaks away beyond the error of T: else stick and slip would alternate
-                bound = (1.0 + 3.0 * accuracy) * static_friction(bodies, i) * force[i, NORMAL, k]
+                bound = (1.0 + BREAKING * accuracy) * static_friction(bodies, i) * force[i, NORMAL, k]
                 event[i, FRICTION, k] = bound - abs(force[i, FRICTION, k])
             else:
                 event[i, FRICTION, k] = state[i] * solution.seen[row, SLIP] + STILL

@@ -9,15 +9,22 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.collocation.gaps import see_gap
-from rubhpc.kernels.collocation.structures import PENALTY, Bodies, CaseState, Solution
+from rubhpc.kernels.collocation.structures import (  # noqa: TC001 - part of a kernel's signature
+    Bodies,
+    CaseState,
+    Solution,
+)
 from rubhpc.kernels.collocation.tables import turn_freely
 from rubhpc.kernels.coordinate_steps import floor_log2
+from rubhpc.kernels.cubics import turning_value
+from rubhpc.kernels.laws import PENALTY
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 GAP_TOLERANCE = 1e-13  # m: what a gap does within it is not looked at
 RECENT = 0.5  # of the last contact: so long a pair that has opened is looked at only now and then
+LEAST_GAP, GAP_BEFORE, RATE_BEFORE = range(3)  # rows of `Solution.turned`
 RARELY = 0.5  # of the time since it has opened
 
 
@@ -57,6 +64,8 @@ def fly(
         bodies.bend,
     )
     size, highest = np.empty(n_mode), power.shape[0] - 1
+    for i in range(q):
+        solution.turned[RATE_BEFORE, i] = 0.0
     ahead, is_exact, n_look, begun = min(unseen, last_tick - tick), True, 0, tick
     while True:
         if ahead != 0:
@@ -84,6 +93,7 @@ def fly(
                 total += row[k] * x[k]
             start[r] = total
         ahead, is_exact = last_tick - tick, False
+        looked = tick
         for i in range(q):
             first = i * n_local
             see_gap(bodies, i, start, first, i * s, solution)
@@ -95,6 +105,12 @@ def fly(
                         total += row[k] * size[k]
                     rate += slope * start[n_row + first + a]
                     bound += abs(slope) * total
+            if solution.turned[RATE_BEFORE, i] < 0.0 <= rate and tick > solution.looked[0]:
+                passed = (tick - solution.looked[0]) * tick_length
+                before = solution.turned[GAP_BEFORE, i], solution.turned[RATE_BEFORE, i]
+                turning = turning_value(before[0], before[1], gap, rate, passed)
+                solution.turned[LEAST_GAP, i] = min(solution.turned[LEAST_GAP, i], turning)
+            solution.turned[GAP_BEFORE, i], solution.turned[RATE_BEFORE, i] = gap, rate
             soft = bodies.damping[i] / bodies.stiffness[i] if bodies.normal_law[i] == PENALTY else 0.0
             near = gap + soft * max(rate, 0.0)
             least = math.sqrt(2.0 * GAP_TOLERANCE / bound)
@@ -120,3 +136,4 @@ def fly(
             ticks = max(1, int(min(free / tick_length, 1.0 * ahead)))
             if ticks < ahead:
                 ahead, is_exact = ticks, is_close
+        solution.looked[0] = looked

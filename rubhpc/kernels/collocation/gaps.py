@@ -36,7 +36,7 @@ def gap_of(bodies: Bodies, i: int, q: Floats, first: int) -> float:
         across, radius = bodies.aside[i] + q[first + ACROSS], bodies.radius[i]
         reach = math.sqrt((radius + along) * (radius + along) + across * across)
         along = ((2.0 * radius + along) * along + across * across) / (reach + radius)
-    return along
+    return float(along)
 
 
 @linked_sum
@@ -91,4 +91,4 @@ def slip_path(bodies: Bodies, i: int, row: int, first_row: int, moved: float, so
         return moved
     a, b = solution.unit[first_row, 0], solution.unit[first_row, 1]
     c, d = solution.unit[row, 0], solution.unit[row, 1]
-    return bodies.radius[i] * math.atan2(a * d - b * c, a * c + b * d)
+    return float(bodies.radius[i] * math.atan2(a * d - b * c, a * c + b * d))

@@ -11,7 +11,6 @@ from rubhpc.kernels.collocation.laws import friction_ratio, spring_force
 from rubhpc.kernels.collocation.newton import factorise, solve_factorised
 from rubhpc.kernels.collocation.structures import (
     FRICTION,
-    HARD,
     NORMAL,
     OPEN,
     RATE,
@@ -20,6 +19,7 @@ from rubhpc.kernels.collocation.structures import (
     Bodies,
     Solution,
 )
+from rubhpc.kernels.laws import LAGRANGE
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -95,7 +95,7 @@ def find_forces(bodies: Bodies, s: int, state: Ints, solution: Solution, force: 
                 both = start[n_row + first + a] * start[n_row + first + b]
                 opening += both * solution.normal_bend[a, b]
                 slipping -= both * solution.tangent_bend[a, b]
-        if bodies.normal_law[i] == HARD:
+        if bodies.normal_law[i] == LAGRANGE:
             wanted[i] = -opening
             for j in range(q):
                 if state[j] != OPEN:
@@ -126,8 +126,8 @@ def find_impulses(
     """Impulses of the pairs in `touching` at the local motions `start`, into `solution.impulse`.
 
     Newton's restitution for approaches faster than `least` (m/s), and Coulomb's cone, or steady sliding: by
-    Gauss and Seidel's method over the pairs. Pairs in `kept` were closed before: their gap rates are rounding;
-    those in `bound` stay closed, by an impulse that may pull.
+    Gauss and Seidel's method over the pairs. Pairs in `kept` were closed before: their gap rates are
+    rounding; those in `bound` stay closed, by an impulse that may pull.
     """
     q, speed, impulse = touching.size, solution.speed, solution.impulse
     normal, tangent = solution.normal, solution.tangent
@@ -191,9 +191,9 @@ def impulse_of(
 
 @linked_sum
 def is_jammed(bodies: Bodies, s: int, i: int, state: int, solution: Solution) -> bool:
-    """Whether a force would press the gap of a sliding pair closed (Painleve): no force then obeys the laws."""
+    """Whether forces press the gap of a sliding pair further closed: none obeys the laws (Painleve)."""
     row = i * s
-    if state == STICKING or state == OPEN or bodies.normal_law[i] != HARD:
+    if state in (STICKING, OPEN) or bodies.normal_law[i] != LAGRANGE:
         return False
     ratio = state * friction_ratio(bodies, i, solution.seen[row, SLIP])[0]
     along = coupling(bodies, solution.normal, row, i, solution.normal, row, i)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from rubhpc.kernels._jit import linked_sum
-from rubhpc.kernels.collocation.structures import HERTZ, Bodies
-from rubhpc.kernels.laws import COULOMB, STRIBECK, TABLE
+from rubhpc.kernels.collocation.structures import Bodies  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.laws import COULOMB, HERTZ, STRIBECK, TABLE
 
 
 @linked_sum
@@ -18,16 +18,16 @@ def spring_force(bodies: Bodies, i: int, gap: float, rate: float) -> tuple[float
     k, c = bodies.stiffness[i], bodies.damping[i]
     if bodies.normal_law[i] == HERTZ:  # with Hunt and Crossley's damping
         root, damped = math.sqrt(abs(gap)), 1.0 - c * rate
-        return -k * gap * root * damped, -1.5 * k * root * damped, k * gap * root * c
-    return -k * gap - c * rate, -k, -c
+        return float(-k * gap * root * damped), float(-1.5 * k * root * damped), float(k * gap * root * c)
+    return float(-k * gap - c * rate), float(-k), float(-c)
 
 
 @linked_sum
 def spring_end(bodies: Bodies, i: int, gap: float, rate: float) -> float:
     """Positive while the force of a spring law presses; it crosses zero with a slope."""
     if bodies.normal_law[i] == HERTZ:
-        return -gap * (1.0 - bodies.damping[i] * rate)
-    return -gap - bodies.damping[i] / bodies.stiffness[i] * rate
+        return float(-gap * (1.0 - bodies.damping[i] * rate))
+    return float(-gap - bodies.damping[i] / bodies.stiffness[i] * rate)
 
 
 @linked_sum
@@ -53,5 +53,5 @@ def friction_ratio(bodies: Bodies, i: int, slip: float) -> tuple[float, float]:
 def static_friction(bodies: Bodies, i: int) -> float:
     """Largest coefficient of friction of a pair that sticks."""
     if bodies.law.friction_law == COULOMB:
-        return bodies.friction[i] * bodies.law.static_friction_ratio
+        return float(bodies.friction[i] * bodies.law.static_friction_ratio)
     return friction_ratio(bodies, i, 0.0)[0]

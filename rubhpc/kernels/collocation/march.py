@@ -45,7 +45,6 @@ from rubhpc.kernels.collocation.structures import (
     BACKWARD,
     FORWARD,
     FRICTION,
-    HARD,
     NORMAL,
     OPEN,
     RATE,
@@ -59,13 +58,24 @@ from rubhpc.kernels.collocation.structures import (
     Tables,
 )
 from rubhpc.kernels.collocation.tables import end_of_step, fill_step, within_step
+from rubhpc.kernels.collocation.tangent import (
+    Trail,
+    carry_breakaway,
+    carry_event,
+    carry_freely,
+    carry_step,
+    note_event,
+    note_least,
+)
+from rubhpc.kernels.laws import LAGRANGE
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 Ints = NDArray[np.int64]
 
+KNOWN, NEW, SETTLED = range(3)  # of a case that begins: forces and states; neither; states alone
 STEPPING, TRYING, SETTLING = range(3)  # what is to be done next while a pair is closed
-ALLOWED = 2.0  # error of the forces of a step over the accuracy
+ALLOWED = 3.0  # error of the forces of a step over the accuracy, before the record; in it the accuracy
 NEWTON = 0.03  # tolerance of the forces in Newton's method, over that of the steps
 AVERAGED = 20e-6  # s: the error of a shorter step counts as that of its impulse over that time
 BEGINNING = 1.0 / 125.0  # first step of a contact over the last contact of the pair
@@ -79,7 +89,9 @@ PARTED = 1e-9  # of the rim's speed: gap rate above which a pair has parted in a
 
 
 @linked_sum
-def continue_forces(nodes: Nodes, part: float, ratio: float, force: Floats, guess: Floats) -> None:
+def continue_forces(
+    nodes: Nodes, part: float, ratio: float, state: Ints, force: Floats, weight: Floats, guess: Floats
+) -> None:
     """Forces of the last step continued over one that begins after `part` of it and is `ratio` times as long.
 
     By their Legendre series, of one order less where the step is much longer.
@@ -88,17 +100,21 @@ def continue_forces(nodes: Nodes, part: float, ratio: float, force: Floats, gues
     most = s if ratio < 1.5 else s - 1
     for j in range(s):
         x = 2.0 * (part + nodes.at[j] * ratio) - 1.0
+        for k in range(s):
+            weight[k] = 0.0
+        before, now = 1.0, x
+        for m in range(most):
+            for k in range(s):
+                weight[k] += before * nodes.legendre[m, k]
+            later = ((2 * m + 3) * x * now - (m + 1) * before) / (m + 2)
+            before, now = now, later
         for i in range(force.shape[0]):
-            for f in range(2):
-                before, now, total = 1.0, x, 0.0
-                for m in range(most):
-                    coefficient = 0.0
+            if state[i] != OPEN:
+                for f in range(2):
+                    total = 0.0
                     for k in range(s):
-                        coefficient += nodes.legendre[m, k] * force[i, f, k]
-                    total += coefficient * before
-                    later = ((2 * m + 3) * x * now - (m + 1) * before) / (m + 2)
-                    before, now = now, later
-                guess[i, f, j] = total
+                        total += weight[k] * force[i, f, k]
+                    guess[i, f, j] = total
 
 
 @linked_sum
@@ -114,7 +130,7 @@ def hold_forces(force: Floats, guess: Floats) -> None:
 def error_of(
     nodes: Nodes, state: Ints, before: Floats, guess: Floats, is_continued: bool, noise: float
 ) -> float:
-    """Estimated error of the forces of a step, N: by their last coefficients and the jump from the last step."""
+    """Estimated error of the forces of a step, N: by their last coefficients, and the jump between steps."""
     s, error = nodes.at.size, 0.0
     for i in range(state.size):
         if state[i] == OPEN:
@@ -132,10 +148,10 @@ def error_of(
 @linked_sum
 def any_closed(state: Ints) -> bool:
     """Whether a pair is closed."""
+    is_any = False
     for i in range(state.size):
-        if state[i] != OPEN:
-            return True
-    return False
+        is_any = is_any or state[i] != OPEN
+    return is_any
 
 
 @linked_sum
@@ -183,28 +199,27 @@ def take_event(
             memory.scale = LEAST_SCALE
         if is_recorded:
             seen.measured.accumulator.n_contact[pair] += 1
-        if bodies.normal_law[pair] == HARD:
-            if not strike(
-                bodies,
-                nodes,
-                clock,
-                pair,
-                acceleration,
-                is_recorded,
-                accuracy,
-                progress,
-                memory,
-                case,
-                solution,
-                seen,
-            ):
-                return False
+        if bodies.normal_law[pair] == LAGRANGE and not strike(
+            bodies,
+            nodes,
+            clock,
+            pair,
+            acceleration,
+            is_recorded,
+            accuracy,
+            progress,
+            memory,
+            case,
+            solution,
+            seen,
+        ):
+            return False
         memory.slot = lowest
         if case.lasting[pair] > 0.0:
             memory.slot = slot_within(tables, BEGINNING * case.lasting[pair])
     elif kind == NORMAL:
         state[pair] = OPEN
-        if bodies.normal_law[pair] == HARD:
+        if bodies.normal_law[pair] == LAGRANGE:
             stop_opening(bodies, s, pair, solution, x)
         case.lasting[pair] = (progress.tick - case.since[pair]) * clock.tick
         case.since[pair] = progress.tick
@@ -249,8 +264,9 @@ def strike(
     memory.fastest = max(memory.fastest, approach)
     unseen = max(4.0 * clock.tick * acceleration, 4.0 * math.sqrt(2.0 * GAP_TOLERANCE * acceleration))
     least = max(accuracy * memory.fastest, unseen)
+    memory.least, memory.has_impulses = least, 1
     for i in range(state.size):
-        solution.kept[i] = state[i] != OPEN and i != pair and bodies.normal_law[i] == HARD
+        solution.kept[i] = state[i] != OPEN and i != pair and bodies.normal_law[i] == LAGRANGE
         solution.touching[i] = solution.kept[i] or i == pair
         solution.bound[i] = False
     find_impulses(bodies, s, solution.touching, solution.kept, solution.bound, least, solution)
@@ -355,25 +371,51 @@ def advance_by_collocation(
     case: CaseState,
     solution: Solution,
     seen: Seen,
+    trail: Trail | None,
 ) -> int:
     """Advance a case from the tick reached to `last_tick`.
 
-    `power` (levels, nm) are the exponentials of the modes over 2^level ticks. Returns an outcome of
-    `case_progress`.
+    `power` (levels, nm) are the exponentials of the modes over 2^level ticks; a trail keeps tangent and
+    events. Returns an outcome of `case_progress`.
     """
     s, x, state, after = nodes.at.size, case.x, case.state, solution.after
     n_x, top = x.size, tables.is_filled.size - 1
+    allowed = accuracy if is_recorded else ALLOWED * accuracy
     last_step = progress.n_step + MOST_STEPS
     todo, pair, kind, acceleration = STEPPING, -1, NORMAL, 0.0
     tried, attempt, first_tried, is_still = STICKING, 0, STICKING, False
     trial = int(np.int64(-1))
-    if memory.is_new == 1 and any_closed(state):
+    if memory.is_new != KNOWN and any_closed(state):
         for i in range(state.size):
-            solution.waiting[i] = bodies.is_sticky and state[i] != OPEN
+            solution.waiting[i] = memory.is_new == NEW and bodies.is_sticky and state[i] != OPEN
         todo = TRYING
-    memory.is_new = 0
+    memory.is_new = KNOWN
     while True:
         if todo == SETTLING:  # constants to begin with
+            if trail is not None and pair >= 0:
+                is_release = kind == NORMAL and trail.state[pair] != OPEN
+                is_carried = True
+                if kind == FRICTION and trail.state[pair] == STICKING:
+                    is_carried = carry_breakaway(bodies, s, x, state, pair, solution, trail)
+                elif not is_release:
+                    is_carried = carry_event(
+                        bodies,
+                        s,
+                        x,
+                        state,
+                        pair,
+                        kind,
+                        memory.least,
+                        memory.has_impulses == 1,
+                        solution,
+                        trail,
+                    )
+                if not is_carried:
+                    return CONTACT_UNSOLVED
+                approach = (
+                    np.nan if kind == FRICTION or is_release else trail.approach[trail.approach.size - 1]
+                )
+                note_event(pair, kind, trail.state[pair], state[pair], progress.tick, approach, trail)
             see_start(bodies, x, solution)
             if not find_forces(bodies, s, state, solution, solution.instant):
                 return CONTACT_UNSOLVED
@@ -396,6 +438,10 @@ def advance_by_collocation(
             progress.n_step += n_look
             if is_recorded:
                 record_flight(bodies, signals, power, clock, begun, tick, x, progress, seen)
+            if trail is not None:
+                for k in range(bodies.exponent.size):
+                    solution.turn[k] = np.exp(bodies.exponent[k] * ((tick - begun) * clock.tick))
+                carry_freely(bodies.n_complex, solution.turn, trail)
             progress.tick, kind = tick, NORMAL
             if pair < 0:
                 continue
@@ -423,12 +469,16 @@ def advance_by_collocation(
                     slot -= 1
                 if memory.length > 0:
                     ratio = (1 << (tables.first_level + slot)) / memory.length
-                    continue_forces(nodes, memory.part, ratio, case.force, solution.guess)
+                    continue_forces(
+                        nodes, memory.part, ratio, state, case.force, solution.weight, solution.guess
+                    )
                 else:
                     solution.guess[:] = case.force
             if not tables.is_filled[slot]:
                 fill_step(bodies, nodes, tables, slot)
             step = tables.tick * 2.0 ** (tables.first_level + slot)
+            is_exact = trail is not None and todo == STEPPING
+            is_whole = is_recorded or bodies.is_sticky or is_exact
             n_iteration = take_step(
                 bodies,
                 nodes,
@@ -438,7 +488,8 @@ def advance_by_collocation(
                 state,
                 solution.guess,
                 NEWTON * accuracy * memory.scale,
-                False,
+                is_whole,
+                is_exact,
                 solution,
             )
             progress.n_step += 1
@@ -478,7 +529,7 @@ def advance_by_collocation(
                     if state[i] != OPEN:
                         for k in range(s):
                             largest = max(largest, abs(solution.guess[i, NORMAL, k]))
-            if n_iteration < 0 or error > ALLOWED * accuracy * largest:
+            if n_iteration < 0 or error > allowed * largest:
                 if slot > 0:
                     memory.slot = slot - 1
                     if n_iteration < 0:
@@ -488,6 +539,9 @@ def advance_by_collocation(
                     return CONTACT_UNSOLVED
             fill_events(bodies, nodes, state, solution.guess, accuracy, solution)
             place, pair, kind = first_event(bodies, nodes, state, solution)
+            if pair >= 0 and memory.length == 0 and slot > 0:  # so soon after another event
+                memory.slot = slot - 1
+                continue
             whole = 1 << (tables.first_level + slot)
             taken = whole
             if place <= 1.0:
@@ -517,6 +571,19 @@ def advance_by_collocation(
                         solution,
                         seen,
                     )
+                if trail is not None:
+                    carry_step(
+                        bodies,
+                        nodes,
+                        tables,
+                        slot,
+                        taken / whole,
+                        state,
+                        solution.guess,
+                        solution,
+                        trail,
+                    )
+                    note_least(nodes, state, solution.guess, trail)
                 if taken == whole:
                     end_of_step(bodies, tables, slot, x, solution.load, after)
                 else:
@@ -531,7 +598,7 @@ def advance_by_collocation(
                     taken / whole,
                 )
                 memory.slot = slot
-                if taken == whole and error < ALLOWED * accuracy * largest / GROWING and slot < top:
+                if taken == whole and error < allowed * largest / GROWING and slot < top:
                     memory.slot = slot + 1
             if pair < 0:
                 if is_diverged(bodies, x):
@@ -545,6 +612,15 @@ def advance_by_collocation(
             memory.event_tick, memory.n_at_once = progress.tick, 0
         progress.n_event += 1
         is_still = kind == FRICTION
+        memory.has_impulses = 0
+        if trail is not None:
+            for k in range(n_x):
+                trail.before[k] = x[k]
+            for i in range(state.size):
+                trail.state[i] = state[i]
+            see_start(bodies, x, solution)
+            see_rates(bodies, s, pair, solution)
+            trail.approach[trail.approach.size - 1] = -solution.seen[pair * s, RATE]
         clear_impulses(solution.impulse)
         if not take_event(
             bodies,
@@ -564,13 +640,13 @@ def advance_by_collocation(
         ):
             return CONTACT_UNSOLVED
         todo, trial = TRYING, -1
-    if is_recorded and progress.tick == clock.n_sample << clock.sample_level:
-        if progress.tick == progress.next_sample << clock.sample_level:
-            see_start(bodies, x, solution)
-            if not find_forces(bodies, s, state, solution, solution.instant):
-                return CONTACT_UNSOLVED
-            fill_instant_load(bodies, s, solution)
-            record_instant(bodies, signals, clock, case.force, x, progress, seen, solution.begun)
+    is_last = progress.tick == clock.n_sample << clock.sample_level
+    if is_recorded and is_last and progress.tick == progress.next_sample << clock.sample_level:
+        see_start(bodies, x, solution)
+        if not find_forces(bodies, s, state, solution, solution.instant):
+            return CONTACT_UNSOLVED
+        fill_instant_load(bodies, s, solution)
+        record_instant(bodies, signals, clock, case.force, x, progress, seen, solution.begun)
     return FINISHED
 
 

@@ -27,8 +27,6 @@ from rubhpc.kernels.collocation.structures import (
     BY_RATE,
     FRICTION,
     GAP,
-    HARD,
-    HERTZ,
     NORMAL,
     OF_BEND,
     OF_RATE,
@@ -49,6 +47,7 @@ from rubhpc.kernels.collocation.structures import (
     Tables,
 )
 from rubhpc.kernels.collocation.tables import bend_row, rate_row
+from rubhpc.kernels.laws import HERTZ, LAGRANGE
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -60,7 +59,7 @@ SLOW = 0.2  # of the last change: with less progress the matrix is made anew
 
 @linked_sum
 def factorise(a: Floats, pivot: Ints, n: int) -> bool:
-    """Factors of a matrix in its place; False where it is singular."""
+    """Factors of a matrix in its place, with the inverse pivots; False where it is singular."""
     for k in range(n):
         best, largest = k, abs(a[k, k])
         for i in range(k + 1, n):
@@ -75,6 +74,7 @@ def factorise(a: Floats, pivot: Ints, n: int) -> bool:
                 a[k, j] = a[best, j]
                 a[best, j] = held
         inverse, source = 1.0 / a[k, k], a[k]
+        a[k, k] = inverse
         for i in range(k + 1, n):
             target = a[i]
             factor = target[k] * inverse
@@ -103,7 +103,7 @@ def solve_factorised(a: Floats, pivot: Ints, n: int, b: Floats) -> None:
         total = b[k]
         for j in range(k + 1, n):
             total -= a[k, j] * b[j]
-        b[k] = total / a[k, k]
+        b[k] = total * a[k, k]
 
 
 @linked_sum
@@ -127,8 +127,14 @@ def list_closed(bodies: Bodies, nodes: Nodes, state: Ints, solution: Solution) -
 @linked_sum
 def see_start(bodies: Bodies, x: Floats, solution: Solution) -> None:
     """Local motions, velocities and free accelerations at the coordinates x."""
+    see_motions(bodies, x, solution.start.size, solution)
+
+
+@linked_sum
+def see_motions(bodies: Bodies, x: Floats, n: int, solution: Solution) -> None:
+    """The first n of them."""
     start, local = solution.start, bodies.local
-    for r in range(start.size):
+    for r in range(n):
         row, total = local[r], 0.0
         for k in range(x.size):
             total += row[k] * x[k]
@@ -154,31 +160,58 @@ def push_closed(
 
 
 @linked_sum
+def move_freely(rows: Floats, x: Floats, begin: int, end: int, solution: Solution) -> None:
+    """Rows of y from one to another without loads."""
+    y_free = solution.y_free
+    for r in range(begin, end):
+        row, total = rows[r], 0.0
+        for k in range(x.size):
+            total += row[k] * x[k]
+        y_free[r] = total
+
+
+@linked_sum
 def respond(
-    tables: Tables, slot: int, n_row: int, n_local: int, n_closed: int, n_y: int, solution: Solution
+    tables: Tables,
+    slot: int,
+    n_row: int,
+    n_local: int,
+    n_closed: int,
+    begin: int,
+    end: int,
+    solution: Solution,
 ) -> None:
-    """Motion y under the loads of the closed pairs."""
+    """Rows of y from one to another under the loads of the closed pairs."""
     y, y_free, forced, load = solution.y, solution.y_free, tables.forced[slot], solution.load
-    for r in range(n_y):
+    for r in range(begin, end):
         y[r] = y_free[r]
     for k in range(load.size // n_row):
         for c in range(n_closed):
             first = k * n_row + solution.closed[c] * n_local
             for a in range(first, first + n_local):
                 f, row = load[a], forced[a]
-                for r in range(n_y):
+                for r in range(begin, end):
                     y[r] += f * row[r]
 
 
 @linked_sum
-def see_pair(bodies: Bodies, nodes: Nodes, i: int, solution: Solution) -> None:
-    """Fill what is seen of a closed pair at the nodes, by its gaps there and the velocities of y."""
+def see_pair(bodies: Bodies, nodes: Nodes, i: int, is_lean: bool, solution: Solution) -> None:
+    """Fill what is seen of a closed pair at the nodes, by its gaps there and the velocities of y.
+
+    Lean: the velocities at the nodes between are not needed.
+    """
     s, n_local, n_row = nodes.at.size, bodies.n_local, bodies.load.shape[0]
-    first, is_hard = i * n_local, bodies.normal_law[i] == HARD
+    first, is_hard = i * n_local, bodies.normal_law[i] == LAGRANGE
     for k in range(s):
         row, is_last = i * s + k, k == s - 1
         seen, normal, tangent = solution.seen[row], solution.normal[row], solution.tangent[row]
         seen[GAP] = solution.gap[row]
+        if k > 0:
+            moved = solution.place[k, first + ACROSS] - solution.place[0, first + ACROSS]
+            twisted = solution.y[(k - 1) * n_row + first + TWIST] - solution.start[first + TWIST]
+            seen[TURNED] = twisted - slip_path(bodies, i, row, i * s, moved, solution)
+        if is_lean and 0 < k < s - 1:
+            continue
         rates, v = (solution.start, n_row + first) if k == 0 else (solution.y, rate_row(s, n_row, k) + first)
         rate, across = 0.0, 0.0
         for a in range(n_local):
@@ -187,11 +220,6 @@ def see_pair(bodies: Bodies, nodes: Nodes, i: int, solution: Solution) -> None:
                 across += tangent[a] * rates[v + a]
         seen[RATE], seen[SLIP] = rate, bodies.rim_speed[i] + rates[v + TWIST] - across
         seen[WIDENED] = seen[GAP] * solution.curvature[row] * across
-        seen[TURNED] = 0.0
-        if k > 0:
-            moved = solution.place[k, first + ACROSS] - solution.place[0, first + ACROSS]
-            twisted = solution.y[(k - 1) * n_row + first + TWIST] - solution.start[first + TWIST]
-            seen[TURNED] = twisted - slip_path(bodies, i, row, i * s, moved, solution)
         if is_last and not is_hard:
             see_bend(bodies, row, solution)
             total, at = 0.0, bend_row(s, n_row) + first
@@ -211,6 +239,7 @@ def fill_residual(
     state: Ints,
     force: Floats,
     n_closed: int,
+    is_lean: bool,
     solution: Solution,
 ) -> None:
     """Fill the residuals of all equations."""
@@ -218,10 +247,10 @@ def fill_residual(
     step, fade, row = tables.tick * 2.0 ** (tables.first_level + slot), tables.fade[slot], 0
     for c in range(n_closed):
         i = solution.closed[c]
-        see_pair(bodies, nodes, i, solution)
+        see_pair(bodies, nodes, i, is_lean, solution)
         seen, n, t = solution.seen[i * s : i * s + s], force[i, NORMAL], force[i, FRICTION]
         first, end = seen[0], seen[s - 1]
-        is_hard = bodies.normal_law[i] == HARD
+        is_hard = bodies.normal_law[i] == LAGRANGE
         if is_hard:
             for k in range(1, s):
                 residual[row + k - 1] = seen[k, GAP] - fade[k, 0] * first[GAP] - fade[k, 1] * first[RATE]
@@ -294,7 +323,7 @@ def fill_slopes(
                 solution.ratio[row, RATIO], solution.ratio[row, RATIO_SLOPE] = friction_ratio(
                     bodies, i, seen[SLIP]
                 )
-            if bodies.normal_law[i] != HARD:
+            if bodies.normal_law[i] != LAGRANGE:
                 fill_spring_slopes(bodies, i, row, solution)
                 if is_last and bodies.damping[i] > 0.0:
                     fill_bend_slope(bodies, i, row, v, bend_row(s, n_row) + first, solution)
@@ -326,7 +355,7 @@ def fill_bend_slope(bodies: Bodies, i: int, row: int, v: int, at: int, solution:
             across += tangent[a] * y[v + a]
         if a > TWIST:
             squares += y[v + a] * y[v + a]
-    n_along, n_across = solution.unit[row, 0], solution.unit[row, 1]
+    n_across = solution.unit[row, 1]
     for a in range(n_local):
         if a == TWIST:
             continue
@@ -358,7 +387,7 @@ def change_pair(
     """
     s, n_local, n_row = nodes.at.size, bodies.n_local, bodies.load.shape[0]
     first = i * n_local
-    is_hard = bodies.normal_law[i] == HARD
+    is_hard = bodies.normal_law[i] == LAGRANGE
     for k in range(first_node, s):
         row, is_last, changed = i * s + k, k == s - 1, solution.changed[k]
         normal, tangent, seen, bent = (
@@ -417,7 +446,7 @@ def change_residual(
     """
     s, fade, step = nodes.at.size, tables.fade[slot], tables.tick * 2.0 ** (tables.first_level + slot)
     changed, n, slope = solution.changed, force[i, NORMAL], solution.slope
-    first, end, is_hard = changed[0], changed[s - 1], bodies.normal_law[i] == HARD
+    first, end, is_hard = changed[0], changed[s - 1], bodies.normal_law[i] == LAGRANGE
     if is_hard:
         for k in range(1, s):
             target[row + k - 1] = changed[k, GAP] - fade[k, 0] * first[GAP] - fade[k, 1] * first[RATE]
@@ -500,7 +529,7 @@ def fill_matrix(
     force: Floats,
     n_closed: int,
     n: int,
-    n_y: int,
+    n_used: int,
     solution: Solution,
 ) -> bool:
     """Make the matrix of the equations, and its factors; False where it is singular."""
@@ -527,11 +556,11 @@ def fill_matrix(
         i = solution.closed[c]
         for f in range(n_force(bodies, state[i])):
             for k in range(s):
-                for r in range(n_y):
+                for r in range(n_used):
                     change[r] = 0.0
                 for a in range(n_local):
                     size, rows = solution.direction[i * s + k, f, a], forced[k * n_row + i * n_local + a]
-                    for r in range(n_y):
+                    for r in range(n_used):
                         change[r] += size * rows[r]
                 pushed[i, f, k] = 1.0
                 fill_column(bodies, nodes, tables, slot, state, force, n_closed, col, n, solution)
@@ -543,12 +572,12 @@ def fill_matrix(
             for b in range(n_local):
                 if b == TWIST:
                     continue
-                for r in range(n_y):
+                for r in range(n_used):
                     change[r] = 0.0
                 for a in range(n_local):
                     size, rows = solution.turning[i * s + k, a, b], forced[k * n_row + i * n_local + a]
                     if size != 0.0:
-                        for r in range(n_y):
+                        for r in range(n_used):
                             change[r] += size * rows[r]
                 moved[k, i * n_local + b] = 1.0
                 fill_column(bodies, nodes, tables, slot, state, force, n_closed, col, n, solution)
@@ -578,7 +607,7 @@ def noise_of(
     for c in range(n_closed):
         i = solution.closed[c]
         for f in range(n_force(bodies, state[i])):
-            if (f == NORMAL and bodies.normal_law[i] == HARD) or (f == FRICTION and state[i] == STICKING):
+            if (f == NORMAL and bodies.normal_law[i] == LAGRANGE) or (f == FRICTION and state[i] == STICKING):
                 for k in range(s):
                     residual[row + k] = ROUNDING * size * (1.0 if k % 2 == 0 else -1.0)
             row += s
@@ -608,33 +637,35 @@ def take_step(
     state: Ints,
     force: Floats,
     tolerance: float,
+    is_whole: bool,
     is_exact: bool,
     solution: Solution,
 ) -> int:
     """Solve a step from the coordinates x: `force` (q, 2, s), a guess, becomes the solution.
 
     Returns the number of iterations, negative where they do not converge. `tolerance` is that of forces, N.
-    Where `is_exact`, the matrix is that at the solution, for the tangent.
+    Where it is not `is_whole`, velocities at the nodes between may be left out; where `is_exact`, the matrix
+    is that at the solution, for the tangent.
     """
     s, n_local, n_row = nodes.at.size, bodies.n_local, bodies.load.shape[0]
     n_y = (2 * s - 1) * n_row
     n_closed, n_pushed, n = list_closed(bodies, nodes, state, solution)
-    y_free, place, y, free = solution.y_free, solution.place, solution.y, tables.free[slot]
+    place, y = solution.place, solution.y
     matrix, pivot, residual, load = (
         solution.matrix[slot],
         solution.pivot[slot],
         solution.residual,
         solution.load,
     )
+    is_lean = not bodies.is_varied
+    for c in range(n_closed):
+        is_lean = is_lean and bodies.normal_law[solution.closed[c]] == LAGRANGE
+    n_used = s * n_row if is_lean else n_y
     code = code_of(state)
     if solution.states[slot] != code:
         solution.states[slot] = 0
-    see_start(bodies, x, solution)
-    for r in range(n_y):
-        row, total = free[r], 0.0
-        for k in range(x.size):
-            total += row[k] * x[k]
-        y_free[r] = total
+    see_motions(bodies, x, 2 * n_row, solution)
+    move_freely(tables.free[slot], x, int(np.int64(0)), n_used, solution)
     for a in range(load.size):
         load[a] = 0.0
     for r in range(n_row):
@@ -644,7 +675,7 @@ def take_step(
         for k in range(s):
             see_gap(bodies, i, place[0], i * n_local, i * s + k, solution)
     push_closed(bodies, nodes, state, force, n_closed, solution)
-    respond(tables, slot, n_row, n_local, n_closed, n_y, solution)
+    respond(tables, slot, n_row, n_local, n_closed, int(np.int64(0)), n_used, solution)
     for c in range(n_closed):
         first = solution.closed[c] * n_local
         for k in range(1, s):
@@ -658,19 +689,25 @@ def take_step(
             for k in range(1, s):
                 see_gap(bodies, i, place[k], i * n_local, i * s + k, solution)
         push_closed(bodies, nodes, state, force, n_closed, solution)
-        respond(tables, slot, n_row, n_local, n_closed, n_y, solution)
-        if is_solved and not is_exact:
-            return iteration
-        fill_residual(bodies, nodes, tables, slot, state, force, n_closed, solution)
+        respond(tables, slot, n_row, n_local, n_closed, int(np.int64(0)), n_used, solution)
+        if is_solved:
+            if is_whole and is_lean:
+                move_freely(tables.free[slot], x, n_used, n_y, solution)
+                respond(tables, slot, n_row, n_local, n_closed, n_used, n_y, solution)
+            for c in range(n_closed):
+                see_pair(bodies, nodes, solution.closed[c], is_lean and not is_whole, solution)
+            if not is_exact:
+                return iteration
+        fill_residual(bodies, nodes, tables, slot, state, force, n_closed, is_lean, solution)
         if solution.states[slot] == 0 or is_solved:
-            if not fill_matrix(bodies, nodes, tables, slot, state, force, n_closed, n, n_y, solution):
+            if not fill_matrix(bodies, nodes, tables, slot, state, force, n_closed, n, n_used, solution):
                 solution.states[slot] = 0
                 return -iteration
             solution.states[slot], is_fresh = code, True
             solution.noise[slot] = noise_of(bodies, nodes, slot, state, n_closed, n_pushed, n, solution)
             if is_solved:
                 return iteration
-            fill_residual(bodies, nodes, tables, slot, state, force, n_closed, solution)
+            fill_residual(bodies, nodes, tables, slot, state, force, n_closed, is_lean, solution)
         solve_factorised(matrix, pivot, n, residual)
         change, largest, row = 0.0, 0.0, 0
         for r in range(n_pushed):

@@ -19,12 +19,11 @@ from rubhpc.kernels.accumulators import (
     observe_rub,
     observe_sense,
 )
-from rubhpc.kernels.case_progress import Clock, Progress
+from rubhpc.kernels.case_progress import Clock, Progress  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.collocation.structures import (
     BACKWARD,
     FORWARD,
     FRICTION,
-    HARD,
     NORMAL,
     RATE,
     SLIP,
@@ -35,6 +34,7 @@ from rubhpc.kernels.collocation.structures import (
     Tables,
 )
 from rubhpc.kernels.collocation.tables import turn_freely, weights
+from rubhpc.kernels.laws import LAGRANGE
 from rubhpc.kernels.sampling import Measured, store_samples, widen_extrema
 
 Floats = NDArray[np.float64]
@@ -66,7 +66,8 @@ class Signals(Struct):
     gained: Floats  # (2, nx, nx), quadratic forms whose growth is loss, work, J
     drift: Floats  # (2, nx, nx), quadratic forms that grow with the time, W
     is_filled: NDArray[np.bool_]  # (k,)
-    free: Floats  # (k, n, nx), values of smooth rows at the nodes after the first, rates at the end; rough; powers
+    # (k, n, nx): smooth rows, rough ones and powers, node by node after the first; then rates at the end
+    free: Floats
     forced: Floats  # (k, s R, n)
 
 
@@ -448,7 +449,7 @@ def record_contact(
     accumulator.least_slip[i] = min(accumulator.least_slip[i], lowest)
     accumulator.friction_work[i] += worked
     observe_rub(drive, worked, accumulator)
-    if bodies.normal_law[i] != HARD:
+    if bodies.normal_law[i] != LAGRANGE:
         for k in range(s):
             part[k] = n[k] * solution.seen[i * s + k, RATE]
         accumulator.energy[IMPACT_LOSS] -= step * integral_of(nodes, part, 0.0, share)

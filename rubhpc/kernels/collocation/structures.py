@@ -10,7 +10,7 @@ whose squares add up to twice the foreshortening of a beam. The local motions of
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,16 +18,12 @@ from numpy.typing import NDArray
 from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.laws import Law  # noqa: TC001 - part of a kernel's signature
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 Ints = NDArray[np.int64]
 
 ALONG, ACROSS, TWIST, BENDING = range(4)
 FIXED, ROUND = range(2)  # gap: along the axis of the stator, or along the line of centres
-HARD, PENALTY, HERTZ = range(3)  # normal law
 OPEN, FORWARD, BACKWARD, STICKING = 0, 1, -1, 2  # state of a pair; slip is positive in steady sliding
 NORMAL, FRICTION = range(2)  # force of a pair, and event of a pair
 
@@ -61,7 +57,7 @@ class Bodies(Struct):
     aside: Floats  # (q,), of the tip at rest from the axis through the disc, m
     rim_speed: Floats  # (q,), m/s, not negative
     friction: Floats  # (q,), coefficient
-    normal_law: Ints  # (q,)
+    normal_law: Ints  # (q,), of `laws.NORMAL_LAWS`
     stiffness: Floats  # (q,), N/m, or N/m^1.5 of Hertz
     damping: Floats  # (q,), N s/m, or s/m of Hertz
     restitution: Floats  # (q,)
@@ -129,7 +125,10 @@ class Solution(Struct):
     pushed: Floats  # (q, 2, s), of the forces
     changed: Floats  # (s, 6), of what is seen of a pair
     guess: Floats  # (q, 2, s), forces
+    weight: Floats  # (s,)
     instant: Floats  # (q, 2), forces
+    turned: Floats  # (3, q), smallest gap where it turns in flight; gap and rate at the last look
+    looked: Ints  # (1,), tick of that look
     touching: NDArray[np.bool_]  # (q,), pairs that an impact may press
     kept: NDArray[np.bool_]  # (q,), those of them that were closed before
     bound: NDArray[np.bool_]  # (q,), those of them that an impact does not open
@@ -162,7 +161,9 @@ class Memory(Protocol):
     unseen: int  # ticks of a flight that are taken without looking for a touch
     n_at_once: int  # events at one tick
     event_tick: int  # of the last one
-    is_new: int  # forces and states are to be found
+    is_new: int  # what is to be found as a case begins: `march.KNOWN`
+    least: float  # m/s, rate of approach below which the last impact had no restitution
+    has_impulses: int  # whether the last event had impulses
 
 
 _RECORD = np.dtype(
@@ -183,17 +184,20 @@ def _lobatto(s: int) -> Floats:
 def lobatto_nodes(s: int) -> Nodes:
     """Polynomials on s nodes."""
     at, order = _lobatto(s), np.arange(s)
-    power = np.linalg.inv(np.vander(at, increasing=True)).T.copy()
-    from_power: Callable[..., Floats] = np.polynomial.polynomial.polyval
-    comb = np.array([[math.comb(i, m) / math.comb(s - 1, m) for m in order] for i in order])
+    power: Floats = np.linalg.inv(np.vander(at, increasing=True)).T.astype(float)
+    comb = np.array(
+        [[math.comb(i, m) / math.comb(s - 1, m) if m <= i else 0.0 for m in order] for i in order]
+    )
     values = np.vander(at, s + 2, increasing=True)
     slopes = np.array([np.eye(s + 2)[1], np.arange(s + 2.0)])
+    legendre: Floats = np.linalg.inv(np.polynomial.legendre.legvander(2.0 * at - 1.0, s - 1)).astype(float)
+    integral = (at[:, None] ** (order + 1) / (order + 1)) @ power.T
     return Nodes(
         at=at,
-        power=power,
-        integral=np.array([from_power(at, np.r_[0.0, row / (order + 1)]) for row in power]).T.copy(),
+        power=np.ascontiguousarray(power),
+        integral=integral,
         end_slope=power @ order.astype(float),
-        legendre=np.linalg.inv(np.polynomial.legendre.legvander(2.0 * at - 1.0, s - 1)).copy(),
+        legendre=np.ascontiguousarray(legendre),
         bernstein=comb @ power.T,
         hermite=np.linalg.inv(np.vstack([values, slopes])),
     )

@@ -15,7 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import linked_sum
-from rubhpc.kernels.collocation.structures import Bodies, Nodes, Tables
+from rubhpc.kernels.collocation.structures import (  # noqa: TC001 - part of a kernel's signature
+    Bodies,
+    Nodes,
+    Tables,
+)
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

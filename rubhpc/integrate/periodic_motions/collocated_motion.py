@@ -1,0 +1,237 @@
+"""A motion by the collocation integrator, revolution by revolution, with its tangent and its events."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rubhpc.integrate.marches.collocation import CollocationMarch
+from rubhpc.integrate.periodic_motions.piecewise_motion import (
+    MOST_EVENTS,
+    Change,
+    PiecewiseMotion,
+    Unfollowed,
+)
+from rubhpc.integrate.periodic_motions.revolution import NO_PAIR, NO_SPEED, Piece
+from rubhpc.integrate.scheme import Scheme
+from rubhpc.kernels.case_progress import DIVERGED, FINISHED
+from rubhpc.kernels.collocation.structures import NORMAL, OPEN, STICKING
+from rubhpc.kernels.collocation.tangent import AFTER, BEFORE, FULL, KIND, N_EVENT, PAIR
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from rubhpc.integrate.modal_setup import ModalSetup
+    from rubhpc.integrate.record import State
+    from rubhpc.integrate.setup import Setup
+    from rubhpc.kernels.collocation.tangent import Trail
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+ACCURACY = 1e-4  # of forces, at most: periodic motions close to about a hundredth of it
+STATE_BITS = 2  # of a pair in the number of all states
+
+
+def followed_motion(setup: Setup) -> Callable[..., PiecewiseMotion | CollocatedMotion]:
+    """Return what follows the motions of a set-up: in closed form, or by collocation."""
+    return CollocatedMotion if setup.scheme is Scheme.COLLOCATION else PiecewiseMotion
+
+
+def code_of(states: Ints) -> int:
+    """States of all pairs as one number."""
+    return sum((int(state) & 3) << STATE_BITS * i for i, state in enumerate(states))
+
+
+def states_of(code: int, q: int) -> Ints:
+    """States (q,) of a number: open, sliding forward or backward, sticking."""
+    found = np.array([code >> STATE_BITS * i & 3 for i in range(q)])
+    return np.where(found == 3, -1, found)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CollocatedRevolution:
+    """One revolution of the shaft, as `revolution.Revolution`.
+
+    Attributes
+    ----------
+    derivative : (2 n, 2 n)
+        Of its end by its beginning; (2 n, 0) where it was not asked for.
+    """
+
+    end: Floats
+    states: int
+    pieces: list[Piece]
+    derivative: Floats
+    least_gap: Floats
+    least_force: Floats
+
+
+class CollocatedMotion:
+    """Follows motions of one case from the shaft's angle 0, as `PiecewiseMotion` does in closed form.
+
+    Attributes
+    ----------
+    start, states : (2 n,)
+        Where the case begins: its reduced motion, and the states of its pairs.
+    turn : float, s
+        Duration of a revolution.
+    energy : (2 n,)
+        Twice the energy of unit motions, with the spin as their pace.
+    """
+
+    def __init__(
+        self,
+        setup: ModalSetup,
+        clearance: float,
+        friction: float,
+        initial: State | None,
+        march: CollocationMarch | None = None,
+    ) -> None:
+        """Begin at a state, or where a march stands that is needed no more."""
+        if march is None:
+            assert initial is not None
+            march = CollocationMarch(setup, clearance, friction, initial, None)
+        elif initial is not None:
+            march.start_again(initial)
+        self.march, self.setup = march, setup
+        self.turn = setup.interval * setup.samples_per_revolution
+        self.bodies = march.bodies
+        self.n, self.q = self.bodies.stiffness.shape[0], len(setup.model.stators)
+        self.energy = np.ones(2 * self.n)
+        self.energy[: self.n] = setup.spin**2
+        self._accuracy = min(setup.accuracy, ACCURACY)
+        self.start, self.states = march.motion(), code_of(march.states)
+
+    @cached_property
+    def _columns(self) -> Floats:
+        """Changes of the coordinates (nx, 2 n) by the motion."""
+        coordinates, none = self.march.modes.coordinates, np.zeros(2 * self.n)
+        at_none = coordinates(none)
+        return np.array([coordinates(unit) - at_none for unit in np.eye(none.size)]).T.copy()
+
+    def size(self, motion: Floats) -> float:
+        """Root of v'v + spin^2 u'u of a reduced motion (2 n,), in which the mass matrix is the identity."""
+        return math.sqrt(self.energy @ motion**2)
+
+    def revolve(self, motion: Floats, states: int) -> CollocatedRevolution:
+        """Follow a motion (2 n,) with the pairs in these states through one revolution."""
+        return self.follow(motion, states, 1)[0]
+
+    def follow(
+        self,
+        motion: Floats,
+        states: int,
+        n_revolution: int,
+        most_events: int = MOST_EVENTS,
+        *,
+        phase: float = 0.0,
+        share: float = 1.0,
+        has_derivative: bool = True,
+    ) -> list[CollocatedRevolution]:
+        """Follow a motion through several revolutions, or shares of them, from a phase on.
+
+        Raises
+        ------
+        Unfollowed
+            A displacement passes its limit, no contact forces obey the laws, or events follow without end.
+        """
+        march, clock, found = self.march, self.march.clock, []
+        per_revolution = clock.samples_per_revolution << clock.sample_level
+        begin = round(phase * per_revolution)
+        march.place_at(motion, states_of(states, self.q), begin)
+        for _ in range(n_revolution):
+            end = begin + round(share * per_revolution)
+            trail = self._carry(end, np.eye(2 * self.n, 2 * self.n if has_derivative else 0), most_events)
+            found.append(
+                CollocatedRevolution(
+                    end=march.motion(),
+                    states=code_of(march.states),
+                    pieces=self._pieces(trail, states, begin, end),
+                    derivative=march.modes.motion @ trail.columns,
+                    least_gap=trail.least[0],
+                    least_force=trail.least[1],
+                )
+            )
+            states, begin = found[-1].states, end
+        return found
+
+    def _pieces(self, trail: Trail, states: int, begin: int, end: int) -> list[Piece]:
+        """What happened from one event to the next, between two ticks."""
+        tick, pieces, at, none = self.march.clock.tick, [], states_of(states, self.q), np.zeros(0)
+        first = begin
+        for k in range(int(trail.count[N_EVENT])):
+            pair, kind, _, after = trail.event[k, [PAIR, KIND, BEFORE, AFTER]].tolist()
+            touches = kind == NORMAL and at[pair] == OPEN
+            before = code_of(at)
+            at[pair] = after
+            pieces.append(
+                Piece(
+                    states=before,
+                    begin=(first - begin) * tick,
+                    duration=(int(trail.tick[k]) - first) * tick,
+                    crossing=1 << pair,
+                    before=none,
+                    touching=np.array([pair]) if touches else NO_PAIR,
+                    approach=trail.approach[k : k + 1].copy() if touches else NO_SPEED,
+                    after=none,
+                    states_after=code_of(at),
+                )
+            )
+            first = int(trail.tick[k])
+        last = code_of(at)
+        pieces.append(
+            Piece(last, (first - begin) * tick, (end - first) * tick, 0, none, NO_PAIR, NO_SPEED, none, last)
+        )
+        return pieces
+
+    def monodromy(self, revolutions: Sequence[CollocatedRevolution]) -> Floats:
+        """Derivative (2 n, 2 n) of a motion's end by its beginning."""
+        columns = np.eye(2 * self.n)
+        for revolution in revolutions:
+            columns = revolution.derivative @ columns
+        return columns
+
+    def revolve_with(self, motion: Floats, states: int, columns: Floats) -> tuple[Floats, int, Floats]:
+        """Motion and states after a revolution, and what small changes (2 n, k) of the beginning become."""
+        march = self.march
+        march.place_at(motion, states_of(states, self.q), 0)
+        trail = self._carry(
+            march.clock.samples_per_revolution << march.clock.sample_level, columns, MOST_EVENTS
+        )
+        return march.motion(), code_of(march.states), march.modes.motion @ trail.columns
+
+    def _carry(self, tick: int, columns: Floats, most_events: int) -> Trail:
+        """Go on to a tick with small changes (2 n, k) of the motion."""
+        outcome, trail = self.march.carry(tick, self._columns @ columns, most_events, self._accuracy)
+        if outcome == DIVERGED:
+            raise Unfollowed(f"a displacement passes {self.setup.displacement_limit:.3g} m")
+        if trail.count[FULL]:
+            raise Unfollowed(f"more than {most_events} events in a revolution")
+        if outcome != FINISHED:
+            raise Unfollowed("no contact forces that obey the laws were found")
+        return trail
+
+    def contact_force(self, states: int, motion: Floats) -> Floats:
+        """Force of each pair (q,), N, at the angle 0; of a closed one at least the smallest number."""
+        self.march.place_at(motion, states_of(states, self.q), 0)
+        self.march.carry(0, self._columns[:, :0], 1)
+        return self.march.reached().contact_force
+
+    def what_changes(self, piece: Piece) -> list[tuple[int, Change]]:
+        """Pairs that an event at the end of a piece concerns, and what becomes of them."""
+        was, after = states_of(piece.states, self.q), states_of(piece.states_after, self.q)
+        found: list[tuple[int, Change]] = []
+        for i in range(self.q):
+            if i in piece.touching:
+                found.append((i, "touch"))
+            if was[i] != OPEN and after[i] == OPEN:
+                found.append((i, "release"))
+            elif was[i] != OPEN and was[i] != after[i]:
+                found.append((i, "stick" if after[i] == STICKING else "slip"))
+        return found
