@@ -248,6 +248,13 @@ def test_a_fixed_normal_is_that_of_the_closed_form(name):
         assert found.reversals_per_revolution == pytest.approx(known.reversals_per_revolution)
 
 
+def test_a_pair_that_slid_sticks_within_the_friction_of_sliding():
+    """Not within that of rest, where its slip turns: then it slides on."""
+    found, known = both("static ratio, ring of 8", revolutions=6)
+    assert known.stick_fraction.min() > 0.1
+    assert found.stick_fraction == pytest.approx(known.stick_fraction, abs=1e-3)
+
+
 @pytest.mark.parametrize("name", ["sliding, walls", "coulomb, walls", "penalty, walls", "restitution, walls"])
 def test_walls_are_those_of_the_closed_form(name):
     """For a revolution: rounding grows by ten in two. Contacts that part within tolerance do not chatter."""
