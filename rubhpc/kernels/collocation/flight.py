@@ -120,10 +120,10 @@ def fly(
             is_close = False
             if (rate < 0.0 and gap < -rate * tick_length) or (near < 0.0 and soft > 0.0):
                 back = -int(gap / (rate * tick_length)) if gap < 0.0 and rate < 0.0 else 0
-                back = max(back, begun - tick)
+                back = max(back, -((tick - open_at) // 2))  # halves: Newton's method may pass the gap
                 if back == 0:
                     return tick, i, bound, n_look
-                ahead, is_exact = back, True
+                ahead, is_exact, is_seen = back, True, False
                 break
             if gap <= 0.0:  # closed as yet, and opening: while the rate surely stays positive
                 free = max(least, rate / bound)

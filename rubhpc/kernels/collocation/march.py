@@ -67,7 +67,7 @@ from rubhpc.kernels.collocation.tangent import (
     note_event,
     note_least,
 )
-from rubhpc.kernels.laws import LAGRANGE
+from rubhpc.kernels.laws import COULOMB, LAGRANGE
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -478,7 +478,7 @@ def advance_by_collocation(
                 fill_step(bodies, nodes, tables, slot)
             step = tables.tick * 2.0 ** (tables.first_level + slot)
             is_exact = trail is not None and todo == STEPPING
-            is_whole = is_recorded or bodies.is_sticky or is_exact
+            is_whole = is_recorded or bodies.is_sticky or is_exact or state.size > 1
             n_iteration = take_step(
                 bodies,
                 nodes,
@@ -502,7 +502,16 @@ def advance_by_collocation(
                 for k in range(s):
                     weight = nodes.integral[s - 1, k]
                     pressed += weight * solution.event[trial, NORMAL, k]
-                    held += weight * solution.event[trial, FRICTION, k]
+                    if (
+                        is_still
+                        and trial == pair
+                        and tried == STICKING
+                        and bodies.law.friction_law == COULOMB
+                    ):
+                        bound = bodies.friction[trial] * solution.guess[trial, NORMAL, k]
+                        held += weight * (bound - abs(solution.guess[trial, FRICTION, k]))  # it slid before
+                    else:
+                        held += weight * solution.event[trial, FRICTION, k]
                     along += weight * solution.guess[trial, FRICTION, k]
                 if pressed < 0.0:
                     state[trial], case.since[trial] = OPEN, progress.tick
