@@ -30,12 +30,13 @@ Ints = NDArray[np.int64]
 N_LOOK = 16  # parts of a step in which a root is looked for
 MOST_HALVINGS = 60
 NO_ROOT = 2.0
+LEAST_PART = 1e-2  # of the time to a node, of a flight that none sees
 BREAKING = 0.3  # of the accuracy: friction beyond its bound, of the error of T, at which a pair breaks away
 STILL = 1e-9  # m/s, slip that rounding leaves where a pair begins to slide
 
 
 @linked_sum
-def first_root(nodes: Nodes, values: Floats) -> float:
+def first_root(nodes: Nodes, values: Floats, begin: float) -> float:
     """First place in [0, 1] where the polynomial with the values (s,) falls below zero; 2 without one."""
     s, lowest = nodes.at.size, np.inf
     for k in range(s):

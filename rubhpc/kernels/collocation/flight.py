@@ -66,7 +66,7 @@ def fly(
     size, highest = np.empty(n_mode), power.shape[0] - 1
     for i in range(q):
         solution.turned[RATE_BEFORE, i] = 0.0
-    ahead, is_exact, n_look, begun = min(unseen, last_tick - tick), True, 0, tick
+    ahead, is_exact, n_look, open_at = min(unseen, last_tick - tick), True, 0, tick
     while True:
         if ahead != 0:
             if is_exact:
@@ -92,7 +92,7 @@ def fly(
             for k in range(x.size):
                 total += row[k] * x[k]
             start[r] = total
-        ahead, is_exact = last_tick - tick, False
+        ahead, is_exact, is_seen = last_tick - tick, False, True
         looked = tick
         for i in range(q):
             first = i * n_local
@@ -137,3 +137,5 @@ def fly(
             if ticks < ahead:
                 ahead, is_exact = ticks, is_close
         solution.looked[0] = looked
+        if is_seen:
+            open_at = tick

@@ -75,7 +75,7 @@ Ints = NDArray[np.int64]
 
 KNOWN, NEW, SETTLED = range(3)  # of a case that begins: forces and states; neither; states alone
 STEPPING, TRYING, SETTLING = range(3)  # what is to be done next while a pair is closed
-ALLOWED = 3.0  # error of the forces of a step over the accuracy, before the record; in it the accuracy
+ALLOWED, RECORDED = 3.0, 0.1  # error of the forces of a step over the accuracy, before the record and in it
 NEWTON = 0.03  # tolerance of the forces in Newton's method, over that of the steps
 AVERAGED = 20e-6  # s: the error of a shorter step counts as that of its impulse over that time
 BEGINNING = 1.0 / 125.0  # first step of a contact over the last contact of the pair
@@ -380,7 +380,7 @@ def advance_by_collocation(
     """
     s, x, state, after = nodes.at.size, case.x, case.state, solution.after
     n_x, top = x.size, tables.is_filled.size - 1
-    allowed = accuracy if is_recorded else ALLOWED * accuracy
+    allowed = (RECORDED if is_recorded else ALLOWED) * accuracy
     last_step = progress.n_step + MOST_STEPS
     todo, pair, kind, acceleration = STEPPING, -1, NORMAL, 0.0
     tried, attempt, first_tried, is_still = STICKING, 0, STICKING, False
