@@ -30,12 +30,13 @@ Ints = NDArray[np.int64]
 N_LOOK = 16  # parts of a step in which a root is looked for
 MOST_HALVINGS = 60
 NO_ROOT = 2.0
+LEAST_PART = 1e-2  # of the time to a node, of a flight that none sees
 BREAKING = 0.3  # of the accuracy: friction beyond its bound, of the error of T, at which a pair breaks away
 STILL = 1e-9  # m/s, slip that rounding leaves where a pair begins to slide
 
 
 @linked_sum
-def first_root(nodes: Nodes, values: Floats) -> float:
+def first_root(nodes: Nodes, values: Floats, begin: float) -> float:
     """First place in [0, 1] where the polynomial with the values (s,) falls below zero; 2 without one."""
     s, lowest = nodes.at.size, np.inf
     for k in range(s):
@@ -45,9 +46,11 @@ def first_root(nodes: Nodes, values: Floats) -> float:
         lowest = min(lowest, coefficient)
     if lowest > 0.0:
         return NO_ROOT
-    before, begin = values[0], 0.0
+    before = values[0] if begin == 0.0 else value_at(nodes, values, begin)
     for k in range(1, N_LOOK + 1):
         end = k / N_LOOK
+        if end <= begin:
+            continue
         after = value_at(nodes, values, end) if k < N_LOOK else values[s - 1]
         if after < 0.0:
             if before <= 0.0:
@@ -119,23 +122,26 @@ def first_event(bodies: Bodies, nodes: Nodes, state: Ints, solution: Solution) -
     s, event = nodes.at.size, solution.event
     place, pair, kind = NO_ROOT, -1, NORMAL
     for i in range(state.size):
-        values, is_watched = event[i, NORMAL], True
+        values, begin = event[i, NORMAL], 0.0
         is_opening = solution.seen[i * s, RATE] > 0.0 or values[1] > values[0]
         if state[i] == OPEN and values[0] <= 0.0 and is_opening:
-            # Closed within tolerance, and opening: no event before it has opened.
+            # Closed within tolerance, and opening: no event before it has opened, or comes back.
             k = 1
-            while k < s and values[k] <= 0.0:
+            while k < s and values[k] <= 0.0 and solution.seen[i * s + k, RATE] >= 0.0:
                 k += 1
-            is_watched = k < s
-            if is_watched:
-                for j in range(k):
-                    values[j] = 0.5 * values[k]
-        if not is_watched:
-            continue
+            if k == s:
+                continue
+            begin = nodes.at[k]
+            if values[k] <= 0.0:  # it has opened and closed before the node: as a parabola does
+                parts, comes = solution.seen[i * s, RATE], solution.seen[i * s + k, RATE]
+                root = begin * min(1.0, max(LEAST_PART, 2.0 * parts / (parts - comes)))
+                if root < place:
+                    place, pair, kind = root, i, NORMAL
+                continue
         for f in range(2):
             if f == FRICTION and (state[i] == OPEN or not bodies.is_sticky):
                 continue
-            root = first_root(nodes, event[i, f])
+            root = first_root(nodes, event[i, f], begin if f == NORMAL else 0.0)
             if f == NORMAL and state[i] != OPEN and root == 0.0 and values[1] > 0.0 and values[s - 1] > 0.0:
                 continue  # rounding where it has just closed
             if root < place:

@@ -66,7 +66,7 @@ def fly(
     size, highest = np.empty(n_mode), power.shape[0] - 1
     for i in range(q):
         solution.turned[RATE_BEFORE, i] = 0.0
-    ahead, is_exact, n_look, begun = min(unseen, last_tick - tick), True, 0, tick
+    ahead, is_exact, n_look, open_at = min(unseen, last_tick - tick), True, 0, tick
     while True:
         if ahead != 0:
             if is_exact:
@@ -92,7 +92,7 @@ def fly(
             for k in range(x.size):
                 total += row[k] * x[k]
             start[r] = total
-        ahead, is_exact = last_tick - tick, False
+        ahead, is_exact, is_seen = last_tick - tick, False, True
         looked = tick
         for i in range(q):
             first = i * n_local
@@ -120,10 +120,10 @@ def fly(
             is_close = False
             if (rate < 0.0 and gap < -rate * tick_length) or (near < 0.0 and soft > 0.0):
                 back = -int(gap / (rate * tick_length)) if gap < 0.0 and rate < 0.0 else 0
-                back = max(back, begun - tick)
+                back = max(back, -((tick - open_at) // 2))  # halves: Newton's method may pass the gap
                 if back == 0:
                     return tick, i, bound, n_look
-                ahead, is_exact = back, True
+                ahead, is_exact, is_seen = back, True, False
                 break
             if gap <= 0.0:  # closed as yet, and opening: while the rate surely stays positive
                 free = max(least, rate / bound)
@@ -137,3 +137,5 @@ def fly(
             if ticks < ahead:
                 ahead, is_exact = ticks, is_close
         solution.looked[0] = looked
+        if is_seen:
+            open_at = tick

@@ -67,7 +67,7 @@ from rubhpc.kernels.collocation.tangent import (
     note_event,
     note_least,
 )
-from rubhpc.kernels.laws import LAGRANGE
+from rubhpc.kernels.laws import COULOMB, LAGRANGE
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -75,7 +75,7 @@ Ints = NDArray[np.int64]
 
 KNOWN, NEW, SETTLED = range(3)  # of a case that begins: forces and states; neither; states alone
 STEPPING, TRYING, SETTLING = range(3)  # what is to be done next while a pair is closed
-ALLOWED = 3.0  # error of the forces of a step over the accuracy, before the record; in it the accuracy
+ALLOWED, RECORDED = 3.0, 0.1  # error of the forces of a step over the accuracy, before the record and in it
 NEWTON = 0.03  # tolerance of the forces in Newton's method, over that of the steps
 AVERAGED = 20e-6  # s: the error of a shorter step counts as that of its impulse over that time
 BEGINNING = 1.0 / 125.0  # first step of a contact over the last contact of the pair
@@ -380,7 +380,7 @@ def advance_by_collocation(
     """
     s, x, state, after = nodes.at.size, case.x, case.state, solution.after
     n_x, top = x.size, tables.is_filled.size - 1
-    allowed = accuracy if is_recorded else ALLOWED * accuracy
+    allowed = (RECORDED if is_recorded else ALLOWED) * accuracy
     last_step = progress.n_step + MOST_STEPS
     todo, pair, kind, acceleration = STEPPING, -1, NORMAL, 0.0
     tried, attempt, first_tried, is_still = STICKING, 0, STICKING, False
@@ -478,7 +478,7 @@ def advance_by_collocation(
                 fill_step(bodies, nodes, tables, slot)
             step = tables.tick * 2.0 ** (tables.first_level + slot)
             is_exact = trail is not None and todo == STEPPING
-            is_whole = is_recorded or bodies.is_sticky or is_exact
+            is_whole = is_recorded or bodies.is_sticky or is_exact or state.size > 1
             n_iteration = take_step(
                 bodies,
                 nodes,
@@ -502,7 +502,16 @@ def advance_by_collocation(
                 for k in range(s):
                     weight = nodes.integral[s - 1, k]
                     pressed += weight * solution.event[trial, NORMAL, k]
-                    held += weight * solution.event[trial, FRICTION, k]
+                    if (
+                        is_still
+                        and trial == pair
+                        and tried == STICKING
+                        and bodies.law.friction_law == COULOMB
+                    ):
+                        bound = bodies.friction[trial] * solution.guess[trial, NORMAL, k]
+                        held += weight * (bound - abs(solution.guess[trial, FRICTION, k]))  # it slid before
+                    else:
+                        held += weight * solution.event[trial, FRICTION, k]
                     along += weight * solution.guess[trial, FRICTION, k]
                 if pressed < 0.0:
                     state[trial], case.since[trial] = OPEN, progress.tick

@@ -432,7 +432,8 @@ def record_contact(
     for k in range(s):
         slip = solution.seen[i * s + k, SLIP]
         if state[i] != STICKING and nodes.at[k] <= share and slip != 0.0:
-            observe_sense(i, FORWARD if slip > 0.0 else BACKWARD, accumulator)
+            sense = FORWARD if slip > 0.0 else BACKWARD
+            observe_sense(i, state[i] if bodies.is_sticky else sense, accumulator)  # at rest slip is rounding
     drive = bodies.rim_speed[i] * step * integral_of(nodes, t, 0.0, share)
     worked = 0.0
     for k in range(s):

@@ -110,10 +110,10 @@ def test_error_is_controlled():
     rig = trial_rig(1)
     known = simulate(rig, **UPDATED, accuracy=1e-9)
     assert known.energy_residual < 1e-7
-    for accuracy, most in ((1e-6, 2e-7), (1e-5, 1e-6), (1e-3, 1e-5)):
+    for accuracy in (1e-6, 1e-5, 1e-3):
         found = simulate(rig, **UPDATED, accuracy=accuracy)
-        assert distance(found, known) < most
-        assert found.energy_residual < 1e-7
+        assert distance(found, known) < 0.1 * accuracy
+        assert found.energy_residual < max(0.1 * accuracy, 1e-7)
 
 
 @pytest.mark.parametrize("normal", ["fixed", "updated"])
@@ -161,7 +161,7 @@ def test_bent_stator_needs_what_it_needs():
 
 @pytest.mark.parametrize("n_stator", [1, 3])
 def test_closed_gaps_are_closed_and_forces_press(n_stator):
-    """Curved gaps from the samples, in the complex plane: none penetrates by more than rounding."""
+    """Curved gaps from the samples, in the complex plane: none penetrates by more than events leave."""
     rig = trial_rig(n_stator)
     record = simulate(
         rig, **(CLOSE | {"revolutions": 1}), normal="updated", samples_per_revolution=4096, keep=("waveform",)
@@ -169,13 +169,13 @@ def test_closed_gaps_are_closed_and_forces_press(n_stator):
     axis = np.exp(1j * np.array([stator.angle for stator in rig.stator]))[:, np.newaxis]
     tip = (0.06 + 40e-6 + record.stator_axial + 1j * record.stator_lateral) * axis
     gap = abs(tip - (record.vertical + 1j * record.horizontal)) - 0.06
-    assert gap.min() >= -1e-12
+    assert gap.min() >= -1e-4 * 40e-6
     assert record.contact_force.min() >= 0.0
     # In contact from this sample to the next: closed at both ends.
     held = (record.contact_force[:, :-1] > 0.0) & (record.contact_force[:, 1:] > 0.0)
     before = np.roll(held, 1, axis=1) & held
     assert np.count_nonzero(before) > 50
-    assert np.median(abs(gap[:, :-1][before])) <= 1e-12
+    assert np.median(abs(gap[:, :-1][before])) <= 1e-5 * 40e-6
 
 
 def test_forces_of_a_bent_ring_are_those_of_finer_steps():
