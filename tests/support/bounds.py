@@ -47,8 +47,7 @@ def a_rig(draw: random.Random, *, bent: bool = False) -> Any:
         kind = LumpedStator(node=node, radius=0.06, mass=mass, stiffness=stiffness, damping=2.0)
     angles = [2.0 * math.pi * i / count for i in range(count)]
     rig = replace(rig, stator=tuple(replace(kind, angle=angle) for angle in angles))
-    if bent:
-        rig = replace(rig, stator=tuple(replace(one, geometry="second_order") for one in rig.stator))
+    rig = rig.with_geometry("second_order" if bent else "linear")
     return with_keys(rig, {"rotor.damping.alpha": 10 ** draw.uniform(0.0, 2.0)})
 
 
@@ -56,6 +55,7 @@ def a_law(draw: random.Random, kinds: str) -> Case:
     """Keys of one of the laws, of which each has a letter."""
     stiffness, damping = 10 ** draw.uniform(3.0, 12.0), draw.choice([0.0, 10.0])
     penalty: Case = {"law": "penalty", "stiffness": stiffness, "damping": damping}
+    hertz: Case = {"law": "hertz", "stiffness": 1e4 * stiffness, "damping": 0.1 * damping}
     coulomb = {"friction_law": "coulomb", "static_friction_ratio": draw.choice([1.0, 1.0, 1.5])}
     laws: dict[str, Case] = {
         "s": {},
@@ -64,11 +64,12 @@ def a_law(draw: random.Random, kinds: str) -> Case:
         "b": penalty | coulomb,
         "r": {"restitution": draw.choice([0.1, 0.5, 1.0])},
         "e": {"restitution": 0.5} | coulomb,
+        "h": hertz | coulomb,
         "u": {"normal": "updated"},
         "v": {"normal": "updated"} | coulomb,
         "t": {"friction_law": "stribeck", "static_friction_ratio": 1.2, "stribeck_speed": 0.1},
     }
-    return laws[draw.choice(kinds)]
+    return {"normal": "fixed", "friction_law": "sliding"} | laws[draw.choice(kinds)]
 
 
 def a_case(draw: random.Random, kinds: str) -> Case:
@@ -93,7 +94,7 @@ def a_start(draw: random.Random) -> Case:
     }
 
 
-def simulated(draw: random.Random, kinds: str = "sscpbreuvt", **fixed: Any) -> tuple[str, Case]:
+def simulated(draw: random.Random, kinds: str = "sscpbrehuvt", **fixed: Any) -> tuple[str, Case]:
     case = a_case(draw, kinds) | a_start(draw)
     case |= {
         "rig": a_rig(draw),
@@ -106,10 +107,10 @@ def simulated(draw: random.Random, kinds: str = "sscpbreuvt", **fixed: Any) -> t
     return "simulate", case | fixed
 
 
-def curved(draw: random.Random) -> tuple[str, Case]:
-    """Gaps that curve, for bent stators under each law."""
-    law = draw.choice(["updated", "fixed"])
-    return simulated(draw, "sc", rig=a_rig(draw, bent=True), normal=law)
+def bent(draw: random.Random) -> tuple[str, Case]:
+    """Bent stators under each law."""
+    normal = draw.choice(["updated", "fixed"])
+    return simulated(draw, "scpbreht", rig=a_rig(draw, bent=True), normal=normal)
 
 
 def stepped(draw: random.Random) -> tuple[str, Case]:
@@ -119,12 +120,12 @@ def stepped(draw: random.Random) -> tuple[str, Case]:
 
 
 def settled_directly(draw: random.Random) -> tuple[str, Case]:
-    return simulated(draw, "scpbreuv", transient="direct", revolutions=2)
+    return simulated(draw, "scpbrehuv", transient="direct", revolutions=2)
 
 
 def run_up(draw: random.Random) -> tuple[str, Case]:
     """Run-ups at given speeds, and drives."""
-    case = a_case(draw, "sscpbreuv") | {"rig": a_rig(draw, bent=draw.random() < 0.2)}
+    case = a_case(draw, "sscpbrehuv") | {"rig": a_rig(draw, bent=draw.random() < 0.2)}
     revolutions, speed = draw.choice([1.01, 3.03, 10.1]), draw.uniform(50.0, 900.0)
     time_taken = 2.0 * math.pi * revolutions / speed
     if draw.random() < 0.5:
@@ -136,7 +137,7 @@ def run_up(draw: random.Random) -> tuple[str, Case]:
 
 
 def periodic(draw: random.Random) -> tuple[str, Case]:
-    case = a_case(draw, "sscpbreuv") | {"rig": a_rig(draw), "speed_ratio": draw.uniform(0.5, 4.0)}
+    case = a_case(draw, "sscpbrehuv") | {"rig": a_rig(draw), "speed_ratio": draw.uniform(0.5, 4.0)}
     return "periodic", case | {"transient": draw.choice([0, 5]), "period": draw.choice([1, 2, 3])}
 
 
@@ -148,7 +149,7 @@ def branch(draw: random.Random) -> tuple[str, Case]:
 
 KINDS: dict[Callable[[random.Random], tuple[str, Case]], int] = {  # with how often each is drawn
     simulated: 5,
-    curved: 3,
+    bent: 3,
     stepped: 2,
     settled_directly: 2,
     run_up: 5,
