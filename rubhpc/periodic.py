@@ -74,8 +74,7 @@ def periodic(
     Raises
     ------
     InputError
-        If an argument cannot be used, or the case has no closed form: the updated normal, friction
-        that depends on the slip speed, and the central difference.
+        If an argument cannot be used; the central difference cannot.
     NoPeriodicMotion
         If none was found; the text says why.
 

@@ -151,7 +151,7 @@ _MEASURES = (
     _measure("transient_revolutions", "1", "revolutions discarded before the record", dtype="int64"),
     _measure("steps", "1", "integration steps", dtype="int64"),
     _measure("scheme", "1", "time integration scheme of the case", dtype="int8", flags=SCHEMES),
-    _measure("left_closed_form", "1", "times that short steps took over from closed form", dtype="int64"),
+    _measure("left_closed_form", "1", "times that collocation took over from closed form", dtype="int64"),
     _measure("wall_time", "s", "wall time of the case"),
 )
 

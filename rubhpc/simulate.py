@@ -99,11 +99,11 @@ def simulate(
     method : {"modal", "central-difference"}
         Integrator: the exact modal one, or the paper's.
     step : float (s) or str, optional
-        Time step in contact (modal; default 1 us; 0.25 us where it takes short steps) or everywhere (central
-        difference; default 0.5 us, or 0.9 of the stability limit where that is less).
+        Time step of the central difference (default 0.5 us, or 0.9 of the stability limit where that is
+        less); longest step of the search for events without a bound (modal; default 1 us).
     accuracy : float
         Relative error of each signal and force, of the modal integrator: by the modes that it leaves out, and
-        by its steps where gaps are curved.
+        by the steps of collocation.
     transient : int, "auto" or "direct"
         Revolutions discarded; "auto" until displacements repeat themselves after 8 or 12 revolutions;
         "direct" until the motion draws near to a stable periodic one that is solved for, on which the record

@@ -190,8 +190,8 @@ def compile_kernels(
 ) -> None:
     """Compile the kernels that every case of this set-up calls, on two revolutions.
 
-    Those for short steps, which only some cases call, are compiled when a case first calls them; so are those
-    for neighbouring motions, unless `all_sets`.
+    Those of collocation, where only some cases need it, are compiled when a case first calls them; so are
+    those for neighbouring motions, unless `all_sets`.
     """
     short = replace(recording, transient=1, transient_limit=None, transient_tolerance=None, revolutions=1)
     record = run_case(setup, clearance=clearance, friction=friction, recording=short, check=check)

@@ -119,7 +119,7 @@ class Marches:
         """Start at `state` and next to it."""
         self.n_aligning = N_ALIGNING
         self.within: list[float] = []
-        self.most_spans = N_ALIGNING + N_ALL  # of short steps; more may take minutes
+        self.most_spans = N_ALIGNING + N_ALL  # of small steps; more may take minutes
         self._start, self._recording = start, recording
         self._model, self._spin = setup.model, setup.spin
         self._state = state

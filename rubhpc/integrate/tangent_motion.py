@@ -36,7 +36,7 @@ GOALS = N_FIRST, N_ALL, N_MOST  # spans that are read together (`regimes.by_grow
 class TangentMotion:
     """A small displacement of a motion, propagated by its exact derivative (`kernels.tangent`).
 
-    Where pairs leave the closed form for short steps, it continues with two motions (`lyapunov.Marches`).
+    Where pairs leave the closed form for collocation, it continues with two motions (`lyapunov.Marches`).
     """
 
     def __init__(
@@ -72,7 +72,7 @@ class TangentMotion:
         Raises
         ------
         NoClosedForm
-            The motion needs short steps.
+            The motion needs collocation.
         """
         while self._beside is None and len(self._grown) < n_revolution:
             if not self._pass_on():

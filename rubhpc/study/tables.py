@@ -29,9 +29,10 @@ TURNING_STEP = 0.25e-6  # s, where it takes short steps of contact
 class Integrator:
     """Scheme, time step and accuracy.
 
-    Without a step the modal scheme takes 1 us in contact (0.25 us where it takes short steps), the central
-    difference 0.5 us, or 0.9 of the stability limit where that is less. The accuracy is the relative error of
-    each signal and force by modes that the modal scheme leaves out, and by its steps where gaps are curved.
+    The step is that of the central difference, by default 0.5 us, or 0.9 of the stability limit where that is
+    less. The modal scheme looks for events in steps up to it without a bound, by default 1 us; collocation
+    has no use for it. The accuracy is the relative error of each signal and force by modes that the modal
+    scheme leaves out, and by the steps of collocation.
     """
 
     method: str = choice(
@@ -42,14 +43,15 @@ class Integrator:
     )
     step: float | None = quantity(
         "s",
-        doc="Time step: in contact (modal), or everywhere (central-difference).",
+        doc="Time step (central-difference), or the longest step of the search for events without a bound "
+        "(modal).",
         example='"0.5 us"',
         default=None,
         at_least=1e-9,  # of a thousandth of it no case would see its end
     )
     accuracy: float = quantity(
         "",
-        doc="Relative error of signals and forces (modal): of omitted modes and, in curved gaps, of steps.",
+        doc="Relative error of signals and forces (modal): of omitted modes, and of steps of collocation.",
         example="1e-3",
         default=1e-3,
         above=0,

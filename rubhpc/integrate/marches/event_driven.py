@@ -39,7 +39,7 @@ MOST_STEPS = 20.0  # of a piece, over those of short steps: with more, its event
 
 
 class EventDrivenMarch(ContactSets):
-    """A case that goes from one contact mode to another; `NoClosedForm` leaves it to contact stepping."""
+    """A case that goes from one contact mode to another; `NoClosedForm` leaves it to collocation."""
 
     def __init__(
         self,

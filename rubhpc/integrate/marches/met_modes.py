@@ -9,11 +9,11 @@ if TYPE_CHECKING:
     from rubhpc.kernels.contact_modes import ModeTables
 
 FORESEEN, MOST_FORESEEN = 8, 4  # pieces at whose beginning a recent set of contacts is solved; most sets
-MOST_REFILLS = 4  # of the tables by one case; with more, short steps cost less
+MOST_REFILLS = 4  # of the tables by one case; with more, collocation costs less
 
 
 class NoClosedForm(Exception):  # noqa: N818 - a state of the motion, never seen by users
-    """The motion needs short steps.
+    """The motion needs collocation.
 
     Contacts open and close without end, or in too many combinations.
     """

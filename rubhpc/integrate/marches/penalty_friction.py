@@ -37,7 +37,7 @@ class PenaltyFrictionMarch(FrictionMarch):
         return self._states_after(np.zeros(self._clearance.size, dtype=np.bool_), 0.0)
 
     def _states_after(self, is_pressed: NDArray[np.bool_], angle: float, further: int = 0) -> int:
-        """States by the overlaps of the motion; forces of earlier short steps are not used."""
+        """States by the overlaps of the motion; forces of steps of collocation are not used."""
         q = self._clearance.size
         found = int(pressed_pairs(self.bodies, self._motion))
         pressed = np.array([bool(found >> i & 1) for i in range(q)])
