@@ -261,6 +261,7 @@ class CollocationMarch(ModalMarch):
             waiting=zeros(q, dtype=np.bool_),
             event=zeros((q, 2, s)),
             after=zeros(n_x),
+            held=zeros(n_x),
             turn=zeros(modes.exponent.size, dtype=complex),
             impulse=zeros((q, 2)),
             speed=zeros((q, 2)),

@@ -22,6 +22,8 @@ from rubhpc.kernels.laws import PENALTY
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
+NONE, LOST = -1, -2  # in place of the pair that touches
+MOST_LOOKS = 10_000_000  # in a flight
 GAP_TOLERANCE = 1e-13  # m: what a gap does within it is not looked at
 RECENT = 0.5  # of the last contact: so long a pair that has opened is looked at only now and then
 LEAST_GAP, GAP_BEFORE, RATE_BEFORE = range(3)  # rows of `Solution.turned`
@@ -48,7 +50,7 @@ def fly(
     Returns
     -------
     tick, pair : int
-        The pair that touches, or -1.
+        The pair that touches, NONE at the end, or LOST where a motion is not finite or its looks have no end.
     acceleration : float
         Bound of that of its gap, m/s2.
     n_look : int
@@ -67,6 +69,8 @@ def fly(
     for i in range(q):
         solution.turned[RATE_BEFORE, i] = 0.0
     ahead, is_exact, n_look, open_at = min(unseen, last_tick - tick), True, 0, tick
+    for k in range(x.size):
+        solution.held[k] = x[k]
     while True:
         if ahead != 0:
             if is_exact:
@@ -81,7 +85,7 @@ def fly(
                 x[k] = after[k]
             tick += ahead
         if tick >= last_tick:
-            return tick, -1, 0.0, n_look
+            return tick, NONE, 0.0, n_look
         n_look += 1
         for k in range(n_complex):
             size[k] = math.sqrt(x[k] * x[k] + x[n_complex + k] * x[n_complex + k])
@@ -123,7 +127,11 @@ def fly(
                 back = max(back, -((tick - open_at) // 2))  # halves: Newton's method may pass the gap
                 if back == 0:
                     return tick, i, bound, n_look
-                ahead, is_exact, is_seen = back, True, False
+                # From the last look: back in time, modes that decay fast would overflow.
+                for k in range(x.size):
+                    x[k] = solution.held[k]
+                ahead, is_exact, is_seen = tick + back - open_at, True, False
+                tick = open_at
                 break
             if gap <= 0.0:  # closed as yet, and opening: while the rate surely stays positive
                 free = max(least, rate / bound)
@@ -139,3 +147,7 @@ def fly(
         solution.looked[0] = looked
         if is_seen:
             open_at = tick
+            for k in range(x.size):
+                solution.held[k] = x[k]
+        if n_look > MOST_LOOKS or not abs(solution.gap[0]) < np.inf:
+            return tick, LOST, 0.0, n_look

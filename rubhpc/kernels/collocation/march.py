@@ -18,7 +18,7 @@ from rubhpc.kernels.case_progress import (
     Progress,
 )
 from rubhpc.kernels.collocation.events import fill_events, first_event
-from rubhpc.kernels.collocation.flight import GAP_TOLERANCE, fly
+from rubhpc.kernels.collocation.flight import GAP_TOLERANCE, LOST, fly
 from rubhpc.kernels.collocation.impacts import (
     clear_impulses,
     coupling,
@@ -443,6 +443,8 @@ def advance_by_collocation(
                     solution.turn[k] = np.exp(bodies.exponent[k] * ((tick - begun) * clock.tick))
                 carry_freely(bodies.n_complex, solution.turn, trail)
             progress.tick, kind = tick, NORMAL
+            if pair == LOST:
+                return DIVERGED if is_diverged(bodies, x) else CONTACT_UNSOLVED
             if pair < 0:
                 continue
         else:
@@ -530,6 +532,9 @@ def advance_by_collocation(
                     solution.waiting[trial] = True
                 continue
             error, largest = 0.0, memory.scale
+            if is_recorded:
+                pivots = seen.measured.accumulator.pivots
+                pivots[0] = max(pivots[0], abs(n_iteration))
             if n_iteration > 0:
                 is_continued = memory.length > 0 and memory.part == 1.0
                 error = error_of(nodes, state, case.force, solution.guess, is_continued, solution.noise[slot])

@@ -135,6 +135,7 @@ class Solution(Struct):
     waiting: NDArray[np.bool_]  # (q,), pairs that may stick or slip
     event: Floats  # (q, 2, s), event functions
     after: Floats  # (nx,)
+    held: Floats  # (nx,), coordinates at the last look of a flight
     turn: Complexes  # (nm,)
     impulse: Floats  # (q, 2)
     speed: Floats  # (q, 2), gap rate and slip before an impact
