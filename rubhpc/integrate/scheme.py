@@ -26,16 +26,25 @@ class Scheme(Enum):
         return SCHEMES.index(self.value.replace("-", "_"))
 
 
-def scheme_of(contact: Contact, integrator: Integrator, *, is_bent: bool = False) -> Scheme:
-    """Return the initial scheme of a case; `is_bent`: a stator has second-order geometry.
+def scheme_of(
+    contact: Contact, integrator: Integrator, *, is_bent: bool = False, is_updated: bool = False
+) -> Scheme:
+    """Return the initial scheme of a case.
+
+    Parameters
+    ----------
+    is_bent : bool
+        Whether a stator has second-order geometry.
+    is_updated : bool
+        Whether a normal turns.
 
     Raises
     ------
     InputError
-        For a bent stator with laws or an integrator that have none.
+        For an integrator that knows no such stator or law.
     """
     check_method(contact, integrator, is_bent=is_bent)
     if integrator.method == "central-difference":
         return Scheme.CENTRAL_DIFFERENCE
-    is_general = is_bent or contact.normal == "updated" or contact.closed_form == "never"
+    is_general = is_bent or is_updated or not contact.are_laws_closed
     return Scheme.COLLOCATION if is_general else Scheme.EVENT_DRIVEN

@@ -7,18 +7,22 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, TypeAlias
 
+import numpy as np
+
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble, model_at
 from rubhpc.fem.free_spin import release
 from rubhpc.fem.probes import with_probes
 from rubhpc.fem.response import step_limit
+from rubhpc.fem.statics import sag_at_stators
 from rubhpc.integrate.measuring.divergence import energy_limit
 from rubhpc.integrate.modal_setup import FINEST_TICK, LONGEST_TURN, ModalSetup
-from rubhpc.integrate.packing import Packed, law_of, pack
+from rubhpc.integrate.packing import Packed, degrees_of, law_of, pack
 from rubhpc.integrate.reduced_model.reduction import reduce_model
 from rubhpc.integrate.reduced_model.truncation import touch_of
 from rubhpc.integrate.scheme import Scheme, scheme_of
 from rubhpc.kernels.central_difference import Stepper
+from rubhpc.kernels.contact_pairs import LATERAL, V, W
 from rubhpc.kernels.laws import MULTIPLIER
 from rubhpc.study.tables import SEARCH_STEP
 
@@ -32,6 +36,9 @@ if TYPE_CHECKING:
     from rubhpc.rig.rig import Rig
     from rubhpc.study.drive_law import DriveLaw
     from rubhpc.study.study import Contact, Integrator
+
+
+ACROSS = 1e-12  # share of a motion across the axis of a stator that is rounding
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -109,6 +116,17 @@ def prepare_steps(
 Setup: TypeAlias = CentralDifferenceSetup | ModalSetup
 
 
+def moves_across(model: Model) -> bool:
+    """Whether a stator's tip and disc can move across its axis, so that their line of centres turns."""
+    aside = np.abs(sag_at_stators(model)[1])
+    for stator, rows, off in zip(model.stators, degrees_of(model), aside, strict=True):
+        weight = {V: math.sin(stator.angle), W: math.cos(stator.angle), LATERAL: 1.0}
+        moves = any(rows[degree] >= 0 and abs(share) > ACROSS for degree, share in weight.items())
+        if moves or off > ACROSS * stator.radius:
+            return True
+    return False
+
+
 def prepare(
     rig: Rig,
     speed: float,
@@ -143,7 +161,8 @@ def prepare(
         model, free_spin = release(model, drive.inertia)
     model = with_probes(model_at(model, speed), rig, probes, speed)
     is_bent = any(stator.squared_slope is not None for stator in model.stators)
-    scheme = scheme_of(contact, integrator, is_bent=is_bent)
+    is_updated = contact.normal == "updated" and moves_across(model)
+    scheme = scheme_of(contact, integrator, is_bent=is_bent, is_updated=is_updated)
     if integrator.method == "modal":
         if 2.0 * math.pi / abs(speed) > LONGEST_TURN:
             least = 2.0 * math.pi / LONGEST_TURN
@@ -151,7 +170,7 @@ def prepare(
                 f"speed: {speed:.3g} rad/s is too slow for events timed to {1e9 * FINEST_TICK:.2g} ns; take "
                 f"{least:.1g} rad/s or more"
             )
-        law, is_updated = law_of(contact), contact.normal == "updated"
+        law = law_of(contact)
         touch = touch_of(model, law, is_updated=is_updated)
         return ModalSetup(
             scheme=scheme,

@@ -142,9 +142,12 @@ class ContactKeys:
     @property
     def closed_form(self) -> ClosedForm:
         """When the modal scheme has a closed form of contact; elsewhere it is collocation."""
-        if self.normal == "updated" or self.law == "hertz":
-            return "never"
-        return CLOSED_FORM[self.friction_law]
+        return "always" if self.normal == "fixed" and self.are_laws_closed else "never"
+
+    @property
+    def are_laws_closed(self) -> bool:
+        """Whether the laws have a closed form along a fixed normal."""
+        return self.law != "hertz" and CLOSED_FORM[self.friction_law] == "always"
 
 
 class ContactArguments(TypedDict, total=False):

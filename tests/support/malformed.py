@@ -232,7 +232,7 @@ CASES = [
         f'{_FRICTION}\n"stator.length" = 0.04',
         "[override] stator.length: is also an axis",
     ),
-    _study("unknown law", '"lagrange"', '"hertz"', '[contact] law: "hertz"', '"lagrange"', '"penalty"'),
+    _study("unknown law", '"lagrange"', '"herz"', '[contact] law: "herz"', '"lagrange"', '"penalty"'),
     _study("penalty without stiffness", '"lagrange"', '"penalty"', "[contact] stiffness: missing"),
     _study("multiplier with stiffness", '"lagrange"', '"lagrange"\nstiffness = 1e6', "[contact] stiffness:"),
     _study(

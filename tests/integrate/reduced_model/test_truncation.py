@@ -91,14 +91,8 @@ def test_rigs_that_need_more_modes_get_them(rig, case, before, monkeypatch):
     [
         # Friction that sticks to the shaft beside the disc jumps and holds it: the twist rings at once.
         ({"node": 10, "youngs_modulus": 1e9}, {"friction_law": "coulomb", "speed_ratio": 1.2}, 2e-3),
-        # The gap of a bent stator opens as its tip moves along.
-        (
-            {"node": 3, "youngs_modulus": 6.8e9, "length": 0.06, "geometry": "second_order"},
-            {"normal": "updated", "speed_ratio": 1.2},
-            1e-3,
-        ),
     ],
-    ids=["sticks", "bent"],
+    ids=["sticks"],
 )
 def test_contacts_that_feel_motion_along_the_rim_need_more_modes(keys, case, before, monkeypatch):
     rig = replace(PACKAGED, stator=(replace(PACKAGED.stator[0], radius=0.01, **keys),))
