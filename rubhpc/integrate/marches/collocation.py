@@ -172,6 +172,11 @@ class CollocationMarch(ModalMarch):
         return self._modes
 
     @property
+    def room(self) -> Solution:
+        """What steps are solved in."""
+        return self._solution
+
+    @property
     def states(self) -> NDArray[np.int64]:
         """State of each pair, (q,)."""
         return self._case.state.copy()
