@@ -321,6 +321,7 @@ class CollocationMarch(ModalMarch):
             approach=np.full(n_event + 1, np.nan),
             count=np.zeros(2, dtype=np.int64),
             least=np.full((2, q), np.inf),
+            swing=np.full((2, q), -np.inf),
             before=np.zeros(n_x),
             state=np.zeros(q, dtype=np.int64),
             column=np.zeros(n_x),

@@ -144,7 +144,7 @@ class CollocatedMotion:
         """Root of v'v + spin^2 u'u of a reduced motion (2 n,), in which the mass matrix is the identity."""
         return math.sqrt(self.energy @ motion**2)
 
-    @property
+    @cached_property
     def nbytes(self) -> int:
         """Bytes of its tables."""
         tables = (*self.march.modes.tables, *self.march.room)
