@@ -31,7 +31,7 @@ def test_branches_and_events_are_those_of_the_closed_form(both):
 
 
 def test_multipliers_are_those_of_the_closed_form(both):
-    exact, found = ([branch for branch in one if branch.period == 1][0] for one in both)
+    exact, found = (next(branch for branch in one if branch.period == 1) for one in both)
     values = np.linspace(1.05e-4, 1.2e-4, 4)
     largest = [
         np.interp(values, branch.values, [abs(point.multipliers[0]) for point in branch.points])
