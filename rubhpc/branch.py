@@ -14,8 +14,9 @@ from rubhpc.input.quantity import parse_quantity
 from rubhpc.integrate.branches.branch import branch_of
 from rubhpc.integrate.branches.branching import Branching
 from rubhpc.integrate.branches.search import search, shot, simulated, starts
+from rubhpc.integrate.periodic_motions.collocated_motion import followed_motion
 from rubhpc.integrate.periodic_motions.family import CLEARANCES, SPEEDS, Family, Operation
-from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion, Unfollowed
+from rubhpc.integrate.periodic_motions.piecewise_motion import Unfollowed
 from rubhpc.integrate.periodic_motions.shooting import NotConverged
 from rubhpc.integrate.record import State
 from rubhpc.integrate.start import fit_to_gaps
@@ -60,7 +61,8 @@ def branch(
     """Follow periodic motions along a parameter, through folds, stable and unstable.
 
     Pseudo-arclength continuation with the exact monodromy matrix. Folds, doublings of the period, second
-    frequencies (Neimark and Sacker) and grazing are located to 1e-9 of the range. At a doubling the motion
+    frequencies (Neimark and Sacker) and grazing are located to 1e-9 of the range, without closed form of the
+    motion between events to 1e-6. At a doubling the motion
     of twice the period is followed too, and where a branch ends at a motion of half its period, that one.
 
     Parameters
@@ -103,8 +105,7 @@ def branch(
     Raises
     ------
     InputError
-        If an argument cannot be used, or the case has no closed form: the updated normal, friction
-        that depends on the slip speed, and the central difference.
+        If an argument cannot be used, or the method is not modal.
     NoPeriodicMotion
         If there is none at `start`.
 
@@ -155,9 +156,9 @@ def _first(
     reason = ""
     if isinstance(begin, State):
         setup, clearance, friction = branching.family.settings(value)
-        piecewise = PiecewiseMotion(setup, clearance, friction, fit_to_gaps(begin, setup, clearance))
+        followed = followed_motion(setup)(setup, clearance, friction, fit_to_gaps(begin, setup, clearance))
         try:
-            return branching.begin(value, piecewise.start, piecewise.states, period)
+            return branching.begin(value, followed.start, followed.states, period)
         except (NotConverged, Unfollowed) as problem:
             reason = str(problem)
     else:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rubhpc.errors import InputError
 from rubhpc.input.fields import FieldError, check_fields, count, quantity, series, text
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rubhpc.rig.rig import Rig
-    from rubhpc.study.contact_keys import ContactKeys
     from rubhpc.study.tables import Integrator, Recording
 
 LONGEST_PERIOD = 64  # revolutions
@@ -106,14 +105,12 @@ def check_followed(along: str, where: str) -> None:
 def check_branch(
     keys: BranchKeys,
     axes: Sequence[Axis],
-    contact: ContactKeys,
     integrator: Integrator,
     recording: Recording,
     *,
     is_sampled: bool,
-    is_bent: bool,
 ) -> None:
-    """Refuse what cannot be followed; `is_bent` where a stator is of the second order."""
+    """Refuse what cannot be followed."""
     check_followed(keys.along, "[branch] along")
     if all(axis.name != keys.along for axis in axes):
         raise InputError(
@@ -123,13 +120,8 @@ def check_branch(
         raise InputError("[branch] along: a sample has no axis to follow; remove [sample] or [branch]")
     if any(axis.sweep != FROM_REST for axis in axes):
         raise InputError("[branch] along: branches need no sweep; remove sweep from the axes")
-    varied: dict[str, Any] = {axis.name: axis for axis in axes if axis.is_contact_key}
-    is_closed = integrator.method == "modal" and contact.closed_form != "never" and not is_bent
-    if not is_closed or "contact.law" in varied:
-        raise InputError(
-            "[branch] along: branches need motion in closed form between events; use method modal, normal "
-            "fixed, stators of linear geometry, and friction_law sliding or coulomb"
-        )
+    if integrator.method != "modal":
+        raise InputError('[branch] along: branches need [integrator] method = "modal"')
     if recording.probe:
         raise InputError("[branch] along: branches have no probes; remove [[record.probe]]")
     if recording.lyapunov:

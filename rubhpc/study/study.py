@@ -317,11 +317,9 @@ class Study:
             check_branch(
                 self.branch,
                 self.axes,
-                self.contact,
                 self.integrator,
                 self.recording,
                 is_sampled=self.sample is not None,
-                is_bent=self.has_bent_stator,
             )
         check_rigs(self.rig, self.axes, self.recording.probe)
         for contact in contacts:

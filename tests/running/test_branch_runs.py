@@ -179,11 +179,10 @@ def test_multipliers_are_drawn(store):
         ('step = "4 um"', 'step = "4 kg"', "step: "),
         ('step = "4 um"', "step = 0", "step: 0 is out of range"),
         ("sweeps = 1", "sweep = 1", "unknown key; did you mean sweeps"),
-        ('model = "mokhtar2017"', 'normal = "updated"', "branches need motion in closed form"),
         (
             "[record]",
-            '[override]\n"stator.geometry" = "second_order"\n[record]',
-            "stators of linear geometry",
+            '[integrator]\nmethod = "central-difference"\n[record]',
+            "branches need .integrator. method",
         ),
         ("[record]", "[sample]\nn = 8\n[record]", "a sample has no axis to follow"),
         ("[0.74, 0.75]", '{ values = [0.74, 0.75], sweep = "up" }', "branches need no sweep"),

@@ -15,7 +15,6 @@ from rubhpc.integrate.branches.point import away_from_events
 from rubhpc.integrate.branches.weak_impact import weakly_impacting
 from rubhpc.integrate.periodic_motions.piecewise_motion import Unfollowed
 from rubhpc.integrate.periodic_motions.shooting import NotConverged
-from rubhpc.kernels.shooting import SAME
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -242,7 +241,8 @@ def _is_half(point: Point) -> bool:
     """Whether a motion has half the period with which it is followed."""
     if point.period % 2:
         return False
-    return bool(point.case.size(half_change(point)) < SAME * point.case.size(point.motion))
+    case = point.case
+    return bool(case.size(half_change(point)) < case.tolerances.half * case.size(point.motion))
 
 
 def _closing(branching: Branching, points: list[Point], base: Point, found: Point) -> Point | None:

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rubhpc.errors import InputError
-from rubhpc.integrate.branches.point import SAME_MOTION, Point, away_from_events
+from rubhpc.integrate.branches.point import Point, away_from_events
 from rubhpc.integrate.periodic_motions.piecewise_motion import Unfollowed
-from rubhpc.integrate.periodic_motions.saltation import monodromy
 from rubhpc.integrate.periodic_motions.shooting import NotConverged, shoot
-from rubhpc.kernels.shooting import CONVERGED
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -21,7 +19,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.integrate.periodic_motions.family import Family
-    from rubhpc.integrate.periodic_motions.revolution import Revolution
 
     Floats = NDArray[np.float64]
 
@@ -30,8 +27,6 @@ SOON = 1e-4  # residual below which a slow iteration may continue
 FAST = 0.02  # ratio of two residuals below which a derivative is used again
 LESS = 0.7  # ratio of a residual to the least before it that counts as progress
 MORE, PATIENCE = (2.0, 10.0), (2, 3)  # allowed ratio to the one before, and iterations without progress
-ROUNDING = 1e-8  # residual below which lack of progress may be rounding
-IN_PLANE = 1e-7  # steps, distance of a motion from its plane
 STEEP = 0.4  # share of the parameter in a step below which it is an unknown
 
 
@@ -93,6 +88,10 @@ class Branching:
             family=point.family,
         )
 
+    def located(self, point: Point) -> float:
+        """How near to its event, in the parameter, a point is to be."""
+        return point.case.tolerances.located * self.family.span
+
     def repeated(self, point: Point, times: int) -> Point:
         """The same motion over several of its periods."""
         if times == 1:
@@ -115,14 +114,14 @@ class Branching:
         """Whether two motions of a case are the same up to a shift by revolutions."""
         if a.motion.size != b.motion.size or a.period != b.period:
             return False
-        limit = SAME_MOTION * a.case.size(a.motion)
+        limit = a.case.tolerances.same * a.case.size(a.motion)
         for k in range(b.period):
             moved = self.moved(b, (a.phase - b.phase) % 1.0 + k)
             if a.case.size(moved.motion - a.motion) <= limit:
                 return True
         return False
 
-    def rate(self, point: Point, share: float | None = None) -> tuple[Floats, list[Revolution]]:
+    def rate(self, point: Point, share: float | None = None) -> tuple[Floats, list[Any]]:
         """Derivative (2 n,) by the parameter, per step, of what a period leaves, at a fixed beginning.
 
         Returned with the revolutions from this beginning a share of a step ahead, by which it is found.
@@ -149,7 +148,7 @@ class Branching:
         period: int = 0,
         most: int = MOST_ITERATIONS,
         is_free: bool = False,
-        in_plane: float = IN_PLANE,
+        in_plane: float = 0.0,
     ) -> Point:
         """Find the motion in the plane through a guess across a direction.
 
@@ -167,8 +166,9 @@ class Branching:
         is_free : bool
             The parameter is never held: around a fold several motions have the same parameter.
         in_plane : float
-            Allowed distance from the plane, in steps: the last iterations hold the parameter where it moves
-            by less, since every new value needs its own contact modes.
+            Allowed distance from the plane, in steps, or that of `Tolerances` if it is more: the last
+            iterations hold the parameter where it moves by less, since every new value needs its own contact
+            modes.
 
         Raises
         ------
@@ -208,15 +208,18 @@ class Branching:
         value = base.value + guess[-1] * self.step
         before = base.motion + guess[:-1] / scale
         origin, rate, derivative, last = base.case, None, None, math.inf
-        least, n_worse = math.inf, 0
+        least, n_worse, tolerances = math.inf, 0, origin.tolerances
+        in_plane = max(in_plane, tolerances.in_plane)
         try:
             case = family.at(value)
             motion = family.carry(before, origin, case)
             for iteration in range(2 * most):
-                revolutions = case.follow(motion, states, period, phase=phase)
+                revolutions: list[Any] = case.follow(motion, states, period, phase=phase)
                 defect = revolutions[-1].end - motion
                 residual = case.size(defect) / max(case.size(motion), np.finfo(float).tiny)
-                if residual <= CONVERGED and revolutions[-1].states == states:
+                n_worse = 0 if residual < LESS * least else n_worse + 1
+                closed = tolerances.enough if n_worse else tolerances.closed
+                if residual <= closed and revolutions[-1].states == states:
                     self._n_found += 1
                     return Point(
                         value=value, phase=phase, motion=motion, states=states, revolutions=revolutions,
@@ -224,14 +227,13 @@ class Branching:
                     )  # fmt: skip
                 states = revolutions[-1].states
                 is_late = iteration >= most and residual > SOON
-                n_worse = 0 if residual < LESS * least else n_worse + 1
                 least = min(least, residual)
-                is_stuck = n_worse > PATIENCE[is_held] and residual > ROUNDING
+                is_stuck = n_worse > PATIENCE[is_held] and residual > tolerances.rounding
                 is_lost = residual > MORE[is_held] * last or is_stuck
                 if is_lost or is_late or not math.isfinite(residual):
                     break
                 if derivative is None or residual > FAST * last:
-                    derivative = monodromy(case, revolutions) - np.eye(motion.size)
+                    derivative = case.monodromy(revolutions) - np.eye(motion.size)
                 last = residual
                 if is_held:
                     motion = motion - np.linalg.solve(derivative, defect)
@@ -251,7 +253,7 @@ class Branching:
                 row = np.append(along[:-1] * scale, along[-1])
                 matrix = np.block([[derivative, rate[:, None]], [row[None, :]]])
                 change = np.linalg.solve(matrix, np.append(-defect, along @ (guess - ahead)))
-                if n_worse and residual <= ROUNDING:  # at a fold the rest is rounding
+                if n_worse and residual <= tolerances.rounding:  # at a fold the rest is rounding
                     motion = motion + change[:-1]
                     continue
                 value += float(change[-1]) * self.step

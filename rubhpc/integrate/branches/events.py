@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.branches.point import REAL, SAME_MOTION
+from rubhpc.integrate.branches.point import REAL
 from rubhpc.integrate.periodic_motions.shooting import NotConverged
 
 if TYPE_CHECKING:
@@ -20,11 +20,9 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-LOCATED = 1e-9  # of the range: distance of a point from its event
-LEFT = 1e-6  # distance of a multiplier outside the unit circle that counts as outside
+NARROW = 1e3  # share of a step, over the tolerance as a share of the range, in which two places are the same
 ALONG = 0.9  # share of the parameter in a step above which it may be held
 JUMP = 1e-3  # of the distance from the unit circle at both ends that is left at a crossing
-SAME_PLACE = 1e-6  # share of a step within which two multipliers leave together
 MOST_SECANTS = 8
 
 
@@ -51,7 +49,7 @@ def crossings(branching: Branching, a: Point, b: Point) -> Iterator[tuple[Event,
     length = float(np.linalg.norm(change))
     n_both = min(a.multipliers.size, b.multipliers.size)  # one may have further, well damped coordinates
     was, now = (np.abs(point.multipliers[:n_both]) - 1.0 for point in (a, b))
-    has_left = (was * now < 0.0) & (np.minimum(np.abs(was), np.abs(now)) > LEFT)
+    has_left = (was * now < 0.0) & (np.minimum(np.abs(was), np.abs(now)) > a.case.tolerances.left)
     ranks: list[int] = np.flatnonzero(has_left).tolist()
     may_fold = any(_is_real(point.multipliers[rank]) for point in (a, b) for rank in ranks)
     is_free = may_fold or abs(change[-1]) < ALONG * length
@@ -79,7 +77,7 @@ def crossings(branching: Branching, a: Point, b: Point) -> Iterator[tuple[Event,
         except (NotConverged, ValueError):
             continue  # a multiplier that leaves through infinity: a contact grazes
         is_root = abs(abs(point.multipliers[rank]) - 1.0) < JUMP * (abs(was[rank]) + abs(now[rank]))
-        if is_root and all(abs(share - other) > SAME_PLACE for other, *_ in found):
+        if is_root and all(abs(share - other) > NARROW * a.case.tolerances.located for other, *_ in found):
             found.append((share, kind_of(point, rank, a, b), point))
     yield from ((event, point) for _, event, point in sorted(found, key=lambda one: one[0]))
 
@@ -87,7 +85,7 @@ def crossings(branching: Branching, a: Point, b: Point) -> Iterator[tuple[Event,
 def tolerance_of(branching: Branching, a: Point, b: Point) -> float:
     """Tolerance of an event, as a share of the way between two points; at a fold the value hardly changes."""
     change = max(abs(b.value - a.value), 1e-3 * branching.step)
-    return float(min(LOCATED * branching.family.span / change, 1e-6))
+    return float(min(branching.located(a) / change, NARROW * a.case.tolerances.located))
 
 
 def _is_real(multiplier: complex) -> bool:
@@ -121,7 +119,7 @@ def halving(branching: Branching, a: Point, b: Point) -> Point | None:
         for _ in range(MOST_SECANTS):
             points.append(branching.correct(points[-1], move * held, held))
             values.append(_above_minus_one(points[-1]))
-            if values[-1] == values[-2] or abs(move) * branching.step < LOCATED * branching.family.span:
+            if values[-1] == values[-2] or abs(move) * branching.step < branching.located(a):
                 break
             move *= -values[-1] / (values[-1] - values[-2])
     except NotConverged:
@@ -143,4 +141,6 @@ def has_halved(point: Point) -> bool:
     """Whether a motion has half the period that it is followed with."""
     if point.period % 2:
         return False
-    return bool(np.linalg.norm(half_change(point)) <= SAME_MOTION * point.case.size(point.motion))
+    return bool(
+        np.linalg.norm(half_change(point)) <= point.case.tolerances.same * point.case.size(point.motion)
+    )

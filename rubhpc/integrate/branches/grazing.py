@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rubhpc.integrate.branches.branching import IN_PLANE, STEEP
-from rubhpc.integrate.branches.events import LOCATED, Event, crossings, tolerance_of
+from rubhpc.integrate.branches.branching import STEEP
+from rubhpc.integrate.branches.events import Event, crossings, tolerance_of
 from rubhpc.integrate.branches.weak_impact import DEPTH, weakly_impacting
 from rubhpc.integrate.periodic_motions.revolution import least_of
 from rubhpc.integrate.periodic_motions.shooting import NotConverged
@@ -123,7 +123,7 @@ def grazing(branching: Branching, history: list[Point], predict: Predictor) -> P
         rate = abs(change[-1]) * branching.step / float(np.linalg.norm(change))
         history = [*history[-2:], trial]
         ahead = reach(branching, *history[-2:])
-        if ahead < CLOSE and ahead * rate < LOCATED * branching.family.span:
+        if ahead < CLOSE and ahead * rate < branching.located(trial):
             return trial
         if not ahead < WITHIN_REACH:
             return None
@@ -213,9 +213,7 @@ def grazing_between(branching: Branching, a: Point, b: Point) -> Grazing | None:
             ahead = _ahead(branching, free[-2:], change, measure)
             guess = (share - near) * ahead
             off = MISPLACED * float(np.linalg.norm(guess))
-            trial = branching.correct(
-                free[-1][1], guess, measure / np.linalg.norm(measure), in_plane=max(off, IN_PLANE)
-            )
+            trial = branching.correct(free[-1][1], guess, measure / np.linalg.norm(measure), in_plane=off)
         except NotConverged:
             trial = None
         if trial is not None and touches(trial) == touches(first):  # in any order
@@ -249,7 +247,7 @@ def grazing_beside(branching: Branching, a: Point, b: Point) -> Grazing | None:
             near, point = pair[-1]
             if root is None or abs(root) > WITHIN_REACH or point.sequence != free.sequence:
                 return None
-            if abs(root - near) * branching.step < LOCATED * branching.family.span:
+            if abs(root - near) * branching.step < branching.located(point):
                 break
             there = root + APPROACH * (near - root)
             pair = [pair[-1], (there, branching.correct(point, (there - near) * held, held))]

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rubhpc.integrate.periodic_motions.saltation import tangents
 from rubhpc.integrate.periodic_motions.shooting import floquet_multipliers
 from rubhpc.kernels._jit import plain
 from rubhpc.kernels.mode_change import AT_REST, HIDDEN, OPENING, least_flight
@@ -19,9 +18,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.periodic_motions.family import Family
+    from rubhpc.integrate.periodic_motions.family import Family, Motion
     from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
-    from rubhpc.integrate.periodic_motions.revolution import Piece, Revolution
+    from rubhpc.integrate.periodic_motions.revolution import Piece
     from rubhpc.integrate.record import State
 
     Floats = NDArray[np.float64]
@@ -32,14 +31,13 @@ if TYPE_CHECKING:
 AT_ONCE = 1e-6  # of the time for which a pair must part to count as open
 
 TURN = 0.2  # change of the motion, over its size, that counts as one step
-SAME_MOTION = 1e-6  # of its size
 NEAR_FOLD = 0.03  # distance of a multiplier from 1 within which the parameter is not held
 MAY_FOLD = 0.7  # a real multiplier beyond which a fold may be a step ahead
 REAL = 1e-6  # imaginary part below which a multiplier counts as real
 CENTRAL = 0.2  # share of an event-free piece at either end without a section
 
 
-def staying_closed(case: PiecewiseMotion, revolutions: Iterable[Revolution]) -> Floats:
+def staying_closed(case: Motion, revolutions: Iterable[Any]) -> Floats:
     """Least distances (2, q), over the touches of a motion, of pairs that stay closed from parting.
 
     A pair that touches, or is closed when another one touches, parts where the impact sends it away, or where
@@ -48,10 +46,10 @@ def staying_closed(case: PiecewiseMotion, revolutions: Iterable[Revolution]) -> 
     which a pair would part for good (`kernels.mode_change`), over the speed of a whirl in the gap; impulses
     that hold it count as the speeds that they change. The second row is its force after the touch, N.
     Infinite for a pair that stays closed at no touch, and for all pairs under a penalty, which has no
-    impacts.
+    impacts. So are they without closed form, where contacts appear and vanish by gaps and forces alone.
     """
     least = np.full((2, case.q), np.inf)
-    if case.bodies.spring > 0.0:
+    if not case.is_exact or case.bodies.spring > 0.0:
         return least
     whirl = abs(case.setup.spin) * max(float(case.bodies.clearance.max()), np.finfo(float).tiny)
     for revolution in revolutions:
@@ -108,7 +106,7 @@ class Point:
         Of the parameter.
     phase : float
         Angle of the shaft, in revolutions, at which `motion` (2 n,) is taken, and `states` of the pairs.
-    revolutions : list of Revolution
+    revolutions : list of Revolution or CollocatedRevolution
         As many as its period.
     family : Family
         Its case at the value is the one whose coordinates these are.
@@ -118,11 +116,11 @@ class Point:
     phase: float
     motion: Floats
     states: int
-    revolutions: list[Revolution]
+    revolutions: list[Any]
     family: Family
 
     @property
-    def case(self) -> PiecewiseMotion:
+    def case(self) -> Motion:
         """The case whose motion this is, set up again where the family had no room for it."""
         return self.family.at(self.value)
 
@@ -133,7 +131,7 @@ class Point:
 
     @property
     def pieces(self) -> list[Piece]:
-        """Its linear pieces, of all revolutions."""
+        """Its pieces, of all revolutions."""
         return [piece for revolution in self.revolutions for piece in revolution.pieces]
 
     @property
@@ -141,14 +139,10 @@ class Point:
         """A change by one step of the parameter alone, (2 n + 1,)."""
         return np.append(np.zeros(self.motion.size), 1.0)
 
-    def tangents(self) -> list[Floats]:
-        """Derivatives (2 n, 2 n), by the motion, of the motion after each piece and its event."""
-        return tangents(self.case, self.revolutions)
-
     @cached_property
     def monodromy(self) -> Floats:
         """Derivative (2 n, 2 n) of the motion after a period with respect to that before it."""
-        return self.tangents()[-1]
+        return self.case.monodromy(self.revolutions)
 
     @cached_property
     def multipliers(self) -> Complexes:

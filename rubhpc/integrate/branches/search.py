@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -10,11 +11,12 @@ import numpy as np
 
 from rubhpc.errors import InputError
 from rubhpc.integrate.branches.arclength import Track, follow
-from rubhpc.integrate.branches.events import LEFT, Event, half_change, has_halved, kind_of
+from rubhpc.integrate.branches.events import NARROW, Event, half_change, has_halved, kind_of
 from rubhpc.integrate.branches.grazing import distances, passed
 from rubhpc.integrate.branches.point import REAL
 from rubhpc.integrate.marches.met_modes import NoClosedForm
-from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion, Unfollowed
+from rubhpc.integrate.periodic_motions.collocated_motion import followed_motion
+from rubhpc.integrate.periodic_motions.piecewise_motion import Unfollowed
 from rubhpc.integrate.periodic_motions.shooting import NotConverged
 from rubhpc.integrate.start import fit_to_gaps, start_of
 from rubhpc.integrate.transient import pass_revolutions
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
 
     from rubhpc.integrate.branches.branching import Branching
     from rubhpc.integrate.branches.point import Point
+    from rubhpc.integrate.periodic_motions.family import Motion
     from rubhpc.integrate.record import State
     from rubhpc.study.tables import Recording
 
@@ -44,7 +47,6 @@ ASTRAY = 0.5  # of a step, allowed deviation of its middle
 # Steps from a doubling at which the motion of twice the period is sought: it may exist, or have the same
 # contacts, only in a narrow range.
 ASIDE = (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 3e-4)
-SAME_VALUE = 1e-6  # of the range, between two doublings that are the same
 OFF_SIDE = 0.5  # of that length, allowed deviation from the direction of the multiplier -1
 
 
@@ -64,8 +66,8 @@ def starts(
             if ended is None:
                 state = Initial()
                 continue
-            state, piecewise = ended
-            yield from _of_each_period(branching, value, piecewise, periods)
+            state, followed = ended
+            yield from _of_each_period(branching, value, followed, periods)
     random = np.random.default_rng(SEED)
     for value in rising:
         setup, clearance, _ = branching.family.settings(value)
@@ -79,19 +81,19 @@ def starts(
 
 
 def _of_each_period(
-    branching: Branching, value: float, piecewise: PiecewiseMotion, periods: Sequence[int]
+    branching: Branching, value: float, followed: Motion, periods: Sequence[int]
 ) -> Iterator[Point]:
     """Motions with exactly these periods that Newton's method finds from a start."""
     for period in periods:
-        point = shot(branching, value, piecewise, (period,))
+        point = shot(branching, value, followed, (period,))
         if point is not None and point.period == period:
             yield point
 
 
 def simulated(
     branching: Branching, value: float, initial: State | Initial, recording: Recording
-) -> tuple[State, PiecewiseMotion] | None:
-    """State of a case after the transient; None where it has no closed form."""
+) -> tuple[State, Motion] | None:
+    """State of a case after the transient; None where it cannot be followed."""
     setup, clearance, friction = branching.family.settings(value)
     try:
         state = (
@@ -99,22 +101,21 @@ def simulated(
             if isinstance(initial, Initial)
             else fit_to_gaps(initial, setup, clearance)
         )
-        march = PiecewiseMotion(setup, clearance, friction, state).march
+        begin = partial(followed_motion(setup), setup, clearance, friction)
+        march = begin(state).march
         if pass_revolutions(march, recording, recording.longest_transient) is not None:
             return None
         state = fit_to_gaps(march.final(), setup, clearance)
-        return state, PiecewiseMotion(setup, clearance, friction, state)
+        return state, begin(state)
     except (NoClosedForm, InputError):
         return None
 
 
-def shot(
-    branching: Branching, value: float, piecewise: PiecewiseMotion, periods: Sequence[int]
-) -> Point | None:
+def shot(branching: Branching, value: float, followed: Motion, periods: Sequence[int]) -> Point | None:
     """The first motion found from a start, among some periods."""
     for period in periods:
         try:
-            return branching.begin(value, piecewise.start, piecewise.states, period)
+            return branching.begin(value, followed.start, followed.states, period)
         except (NotConverged, Unfollowed):
             continue
     return None
@@ -166,7 +167,7 @@ def _event_at(before: Point, point: Point, behind: Point) -> Event:
     """What happens at a point, where a multiplier on the unit circle leaves it there."""
     if has_halved(before) or has_halved(behind):
         return Event.NONE  # nearly there; the multiplier is that of the doubling
-    (on,) = np.nonzero(np.abs(np.abs(point.multipliers) - 1.0) <= LEFT)
+    (on,) = np.nonzero(np.abs(np.abs(point.multipliers) - 1.0) <= point.case.tolerances.left)
     if on.size and before.n_unstable != behind.n_unstable:
         return kind_of(point, int(on[0]), before, behind)
     return Event.NONE
@@ -201,7 +202,7 @@ def _may_hide(branching: Branching, points: list[Point], k: int) -> bool:
     with np.errstate(invalid="ignore"):
         left = (tests[i] - tests[0]) / lengths[0] if before else None
         right = (tests[-1] - tests[-2]) / lengths[-1] if behind else None
-    if _meet_below(tests[i], tests[i + 1], lengths[i], left, right):
+    if _meet_below(tests[i], tests[i + 1], lengths[i], left, right, a.case.tolerances.left):
         return True
     return before is not None and behind is not None and _turns_aside(branching, [before, a, b, behind])
 
@@ -209,7 +210,8 @@ def _may_hide(branching: Branching, points: list[Point], k: int) -> bool:
 def _outside(point: Point) -> set[int]:
     """Possible numbers of multipliers outside the unit circle: at an event one or a pair is on it."""
     modulus = np.abs(point.multipliers)
-    n_outside, is_on = int((modulus > 1.0 + LEFT).sum()), np.abs(modulus - 1.0) <= LEFT
+    left = point.case.tolerances.left
+    n_outside, is_on = int((modulus > 1.0 + left).sum()), np.abs(modulus - 1.0) <= left
     n_real = int((is_on & (np.abs(point.multipliers.imag) <= REAL)).sum())
     n_pair = (int(is_on.sum()) - n_real) // 2
     return {n_outside + i + 2 * j for i in range(n_real + 1) for j in range(n_pair + 1)}
@@ -238,10 +240,12 @@ def _tests(point: Point, n_unstable: int) -> Floats:
     return np.append(apart[:n], [apart[n:].min(initial=np.inf), inside, outside])
 
 
-def _meet_below(a: Floats, b: Floats, length: float, left: Floats | None, right: Floats | None) -> bool:
+def _meet_below(
+    a: Floats, b: Floats, length: float, left: Floats | None, right: Floats | None, least_seen: float
+) -> bool:
     """Whether the tangents of a test on both sides of a step meet below zero within it."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        is_positive = (a > LEFT) & (b > LEFT) & np.isfinite(a) & np.isfinite(b)
+        is_positive = (a > least_seen) & (b > least_seen) & np.isfinite(a) & np.isfinite(b)
         chord = (b - a) / length
         falling = chord if left is None else left
         rising = chord if right is None else right
@@ -366,7 +370,7 @@ def _halved(branching: Branching, track: Track) -> Iterator[Point]:
 
 def _is_known(branching: Branching, tracks: list[Track], point: Point) -> bool:
     """Whether the branch that leaves at a doubling has been followed from its other end."""
-    within = SAME_VALUE * branching.family.span
+    within = NARROW * branching.located(point)
     return any(
         event is Event.PERIOD_DOUBLING
         and other.period == 2 * point.period

@@ -11,7 +11,7 @@ import numpy as np
 
 from rubhpc.integrate.periodic_motions.piecewise_motion import Unfollowed
 from rubhpc.integrate.periodic_motions.revolution import cut, joined, least_of
-from rubhpc.integrate.periodic_motions.saltation import carried
+from rubhpc.integrate.periodic_motions.saltation import carried, tangents
 from rubhpc.integrate.periodic_motions.shooting import NotConverged
 from rubhpc.kernels.mode_change import GAP_TOLERANCE
 
@@ -52,6 +52,7 @@ class LeastGap:
     """
 
     point: Point
+    case: PiecewiseMotion
     pair: int
     gap: float
     bend: float
@@ -61,12 +62,12 @@ class LeastGap:
     @property
     def gradient(self) -> Floats:
         """Derivative (2 n,) of the gap with respect to the motion at the section."""
-        case = self.point.case
+        case = self.case
         tables, j = case.mode(self.point.pieces[self._place].states).tables, _switch(case, self.pair)
         row = tables.switch_re[j] + 1j * tables.switch_im[j]
         row = row * np.exp((tables.exponent[0] + 1j * tables.exponent[1]) * self._time)
         gradient: Floats = tables.enter_re @ row.real - tables.enter_im @ row.imag
-        return gradient @ self.point.tangents()[self._place - 1] if self._place else gradient
+        return gradient @ tangents(case, self.point.revolutions)[self._place - 1] if self._place else gradient
 
     def impact(self, depth: float) -> Floats:
         """Change of the motion (2 n,) after the period by an impact here, to leading order.
@@ -74,7 +75,7 @@ class LeastGap:
         A wall at a depth p is hit with the speed `v = sqrt(2 p d)`, where d is the second derivative of the
         gap, and the pair parts at once. Closed pairs stay closed.
         """
-        case, bodies = self.point.case, self.point.case.bodies
+        case, bodies = self.case, self.case.bodies
         closed = case.mode(self.point.pieces[self._place].states).is_closed.copy()
         closed[self.pair] = True
         hit = np.flatnonzero(closed)
@@ -90,8 +91,10 @@ class LeastGap:
 
 
 def least_gap(point: Point, pair: int) -> LeastGap | None:
-    """Find the least gap of a pair; None where the gap has no minimum in a piece of the period."""
+    """Find the least gap of a pair; None where it has none in a piece, or the case no closed form."""
     case, best = point.case, (np.inf, 0, 0.0)
+    if not case.is_exact:
+        return None
     pieces = point.pieces
     begins = [point.motion, *(piece.after for piece in pieces)]
     for place, (piece, begun) in enumerate(zip(pieces, begins, strict=False)):
@@ -118,7 +121,7 @@ def least_gap(point: Point, pair: int) -> LeastGap | None:
         if abs(moved) < TURNED * case.turn:
             break
     return LeastGap(
-        point=point, pair=pair, gap=float(gap[0]), bend=float(bend[0]), _place=place, _time=time
+        point=point, case=case, pair=pair, gap=float(gap[0]), bend=float(bend[0]), _place=place, _time=time
     )  # fmt: skip
 
 
@@ -163,7 +166,7 @@ def weakly_impacting(branching: Branching, free: Sequence[Point], share: float =
     Raises
     ------
     NotConverged
-        None was found, or no gap is that small.
+        None was found, no gap is that small, or motions have no closed form.
     """
     base, pair, gap, clearance = _beside(branching, free)
     least = least_gap(base, pair)

@@ -172,6 +172,11 @@ class CollocationMarch(ModalMarch):
         return self._modes
 
     @property
+    def room(self) -> Solution:
+        """What steps are solved in."""
+        return self._solution
+
+    @property
     def states(self) -> NDArray[np.int64]:
         """State of each pair, (q,)."""
         return self._case.state.copy()
@@ -317,6 +322,7 @@ class CollocationMarch(ModalMarch):
             approach=np.full(n_event + 1, np.nan),
             count=np.zeros(2, dtype=np.int64),
             least=np.full((2, q), np.inf),
+            swing=np.full((2, q), -np.inf),
             before=np.zeros(n_x),
             state=np.zeros(q, dtype=np.int64),
             column=np.zeros(n_x),

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING
+from functools import cached_property, partial
+from itertools import pairwise
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from rubhpc.integrate.periodic_motions.piecewise_motion import (
     Unfollowed,
 )
 from rubhpc.integrate.periodic_motions.revolution import NO_PAIR, NO_SPEED, Piece
+from rubhpc.integrate.periodic_motions.tolerances import BY_STEPS
 from rubhpc.integrate.scheme import Scheme
 from rubhpc.kernels.case_progress import DIVERGED, FINISHED
 from rubhpc.kernels.collocation.structures import NORMAL, OPEN, STICKING
@@ -38,9 +40,12 @@ ACCURACY = 1e-4  # of forces, at most: periodic motions close to about a hundred
 STATE_BITS = 2  # of a pair in the number of all states
 
 
-def followed_motion(setup: Setup) -> Callable[..., PiecewiseMotion | CollocatedMotion]:
-    """Return what follows the motions of a set-up: in closed form, or by collocation."""
-    return CollocatedMotion if setup.scheme is Scheme.COLLOCATION else PiecewiseMotion
+def followed_motion(
+    setup: Setup, accuracy: float = ACCURACY
+) -> Callable[..., PiecewiseMotion | CollocatedMotion]:
+    """Return what follows the motions of a set-up: in closed form, or by collocation to an accuracy."""
+    is_collocated = setup.scheme is Scheme.COLLOCATION
+    return partial(CollocatedMotion, accuracy=accuracy) if is_collocated else PiecewiseMotion
 
 
 def code_of(states: Ints) -> int:
@@ -56,18 +61,23 @@ def states_of(code: int, q: int) -> Ints:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CollocatedRevolution:
-    """One revolution of the shaft, as `revolution.Revolution`.
+    """One revolution of the shaft, or a part of it, as `revolution.Revolution`.
 
     Attributes
     ----------
-    derivative : (2 n, 2 n)
-        Of its end by its beginning; (2 n, 0) where it was not asked for.
+    motion, begin, begun : (2 n,)
+        Where it begins: the motion, its tick, and the states of the pairs.
+    last : int
+        Tick at which it ends.
     """
 
+    motion: Floats
+    begun: int
+    begin: int
+    last: int
     end: Floats
     states: int
     pieces: list[Piece]
-    derivative: Floats
     least_gap: Floats
     least_force: Floats
 
@@ -83,7 +93,15 @@ class CollocatedMotion:
         Duration of a revolution.
     energy : (2 n,)
         Twice the energy of unit motions, with the spin as their pace.
+
+    Parameters
+    ----------
+    accuracy : float
+        Of forces, at most.
     """
+
+    is_exact: ClassVar[Literal[False]] = False
+    tolerances: ClassVar = BY_STEPS
 
     def __init__(
         self,
@@ -92,6 +110,7 @@ class CollocatedMotion:
         friction: float,
         initial: State | None,
         march: CollocationMarch | None = None,
+        accuracy: float = ACCURACY,
     ) -> None:
         """Begin at a state, or where a march stands that is needed no more."""
         if march is None:
@@ -105,8 +124,14 @@ class CollocatedMotion:
         self.n, self.q = self.bodies.stiffness.shape[0], len(setup.model.stators)
         self.energy = np.ones(2 * self.n)
         self.energy[: self.n] = setup.spin**2
-        self._accuracy = min(setup.accuracy, ACCURACY)
+        self._accuracy = min(setup.accuracy, accuracy)
         self.start, self.states = march.motion(), code_of(march.states)
+
+    @property
+    def _turn(self) -> int:
+        """Ticks of a revolution."""
+        clock = self.march.clock
+        return clock.samples_per_revolution << clock.sample_level
 
     @cached_property
     def _columns(self) -> Floats:
@@ -119,9 +144,17 @@ class CollocatedMotion:
         """Root of v'v + spin^2 u'u of a reduced motion (2 n,), in which the mass matrix is the identity."""
         return math.sqrt(self.energy @ motion**2)
 
-    def revolve(self, motion: Floats, states: int) -> CollocatedRevolution:
+    @cached_property
+    def nbytes(self) -> int:
+        """Bytes of its tables."""
+        tables = (*self.march.modes.tables, *self.march.room)
+        return sum(table.nbytes for table in tables if isinstance(table, np.ndarray))
+
+    def revolve(
+        self, motion: Floats, states: int, *, phase: float = 0.0, share: float = 1.0
+    ) -> CollocatedRevolution:
         """Follow a motion (2 n,) with the pairs in these states through one revolution."""
-        return self.follow(motion, states, 1)[0]
+        return self.follow(motion, states, 1, phase=phase, share=share)[0]
 
     def follow(
         self,
@@ -132,7 +165,6 @@ class CollocatedMotion:
         *,
         phase: float = 0.0,
         share: float = 1.0,
-        has_derivative: bool = True,
     ) -> list[CollocatedRevolution]:
         """Follow a motion through several revolutions, or shares of them, from a phase on.
 
@@ -141,24 +173,25 @@ class CollocatedMotion:
         Unfollowed
             A displacement passes its limit, no contact forces obey the laws, or events follow without end.
         """
-        march, clock, found = self.march, self.march.clock, []
-        per_revolution = clock.samples_per_revolution << clock.sample_level
-        begin = round(phase * per_revolution)
-        march.place_at(motion, states_of(states, self.q), begin)
-        for _ in range(n_revolution):
-            end = begin + round(share * per_revolution)
-            trail = self._carry(end, np.eye(2 * self.n, 2 * self.n if has_derivative else 0), most_events)
+        march, found, none = self.march, [], np.zeros((2 * self.n, 0))
+        ticks = [round((phase + i * share) * self._turn) for i in range(n_revolution + 1)]
+        march.place_at(motion, states_of(states, self.q), ticks[0])
+        for begin, last in pairwise(ticks):
+            trail = self._carry(last, none, most_events)
             found.append(
                 CollocatedRevolution(
+                    motion=motion,
+                    begun=states,
+                    begin=begin,
+                    last=last,
                     end=march.motion(),
                     states=code_of(march.states),
-                    pieces=self._pieces(trail, states, begin, end),
-                    derivative=march.modes.motion @ trail.columns,
+                    pieces=self._pieces(trail, states, begin, last),
                     least_gap=trail.least[0],
                     least_force=trail.least[1],
                 )
             )
-            states, begin = found[-1].states, end
+            motion, states = found[-1].end, found[-1].states
         return found
 
     def _pieces(self, trail: Trail, states: int, begin: int, end: int) -> list[Piece]:
@@ -191,20 +224,25 @@ class CollocatedMotion:
         return pieces
 
     def monodromy(self, revolutions: Sequence[CollocatedRevolution]) -> Floats:
-        """Derivative (2 n, 2 n) of a motion's end by its beginning."""
+        """Derivative (2 n, 2 n) of a motion's end by its beginning; it is followed once more."""
+        first = revolutions[0]
+        self.march.place_at(first.motion, states_of(first.begun, self.q), first.begin)
         columns = np.eye(2 * self.n)
         for revolution in revolutions:
-            columns = revolution.derivative @ columns
+            columns = self._carried(revolution.last, columns)
         return columns
 
     def revolve_with(self, motion: Floats, states: int, columns: Floats) -> tuple[Floats, int, Floats]:
         """Motion and states after a revolution, and what small changes (2 n, k) of the beginning become."""
         march = self.march
         march.place_at(motion, states_of(states, self.q), 0)
-        trail = self._carry(
-            march.clock.samples_per_revolution << march.clock.sample_level, columns, MOST_EVENTS
-        )
-        return march.motion(), code_of(march.states), march.modes.motion @ trail.columns
+        moved = self._carried(self._turn, columns)
+        return march.motion(), code_of(march.states), moved
+
+    def _carried(self, tick: int, columns: Floats) -> Floats:
+        """What becomes of small changes (2 n, k) of the motion up to a tick."""
+        moved: Floats = self.march.modes.motion @ self._carry(tick, columns, MOST_EVENTS).columns
+        return moved
 
     def _carry(self, tick: int, columns: Floats, most_events: int) -> Trail:
         """Go on to a tick with small changes (2 n, k) of the motion."""

@@ -14,11 +14,11 @@ from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
 from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.packing import law_of
-from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion, Unfollowed
+from rubhpc.integrate.periodic_motions.collocated_motion import followed_motion
+from rubhpc.integrate.periodic_motions.piecewise_motion import Unfollowed
 from rubhpc.integrate.record import State
 from rubhpc.integrate.reduced_model.reduction import AlongSpeeds, reduce_to
 from rubhpc.integrate.reduced_model.truncation import Touch, at_standstill, completed, kept_modes, touch_of
-from rubhpc.integrate.scheme import Scheme
 from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import with_keys
 from rubhpc.rig.stators import gap_problem
@@ -27,19 +27,20 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.periodic_motions.revolution import Revolution
+    from rubhpc.integrate.periodic_motions.collocated_motion import CollocatedMotion
+    from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
     from rubhpc.rig.rig import Rig
     from rubhpc.study.contact_keys import Contact
     from rubhpc.study.tables import Integrator
 
     Floats = NDArray[np.float64]
+    Motion = PiecewiseMotion | CollocatedMotion
 
 SPEEDS, CLEARANCES = ("speed_ratio", "speed"), ("clearance_ratio", "clearance")
 MOST_KEPT = 6  # models and set-ups that are kept, and cases in any case
 ROOM = 256_000_000  # bytes of the tables of further ones
-WITH_MODES = 2.2  # bytes of tables and modes, as solved and for pieces, over those of tables
-DIFFERENCE = 1e-6  # of the range, between the two cases of a derivative
+ACCURACY = 1e-6  # of forces by collocation: multipliers come about as near
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -97,22 +98,23 @@ class Family:
         self._models: OrderedDict[int, tuple[Rig, Model]] = OrderedDict()
         self._frequency: tuple[Model, float] | None = None
         self._setups: OrderedDict[tuple[int, float, bool], ModalSetup] = OrderedDict()
-        self._cases: OrderedDict[float, PiecewiseMotion] = OrderedDict()
+        self._cases: OrderedDict[float, Motion] = OrderedDict()
 
-    def at(self, value: float) -> PiecewiseMotion:
+    def at(self, value: float) -> Motion:
         """The case at a value of the parameter.
 
         Raises
         ------
         Unfollowed
-            It has no closed form.
+            It cannot be followed.
         InputError
             The case does not exist.
         """
         if value not in self._cases:
             setup, clearance, friction = self.settings(value, is_measured=self.along not in SPEEDS)
             try:
-                found = PiecewiseMotion(setup, clearance, friction, State.at_rest(setup.model))
+                begin = followed_motion(setup, ACCURACY)
+                found = begin(setup, clearance, friction, State.at_rest(setup.model))
             except NoClosedForm:
                 raise Unfollowed("contacts open and close without end, or in too many combinations") from None
             self._cases[value] = found
@@ -133,7 +135,7 @@ class Family:
             raise InputError(f"{self.along}: {value:g}: {problem}")
         return self._setup(case, model, spin, is_measured), clearance, case.friction
 
-    def carry(self, motion: Floats, before: PiecewiseMotion, after: PiecewiseMotion) -> Floats:
+    def carry(self, motion: Floats, before: Motion, after: Motion) -> Floats:
         """A motion (2 n,) of one case in the coordinates of another."""
         old, new = before.setup, after.setup
         if old.reduced.basis is new.reduced.basis or (
@@ -156,17 +158,17 @@ class Family:
         value: float,
         motion: Floats,
         states: int,
-        revolutions: list[Revolution],
+        revolutions: list[Any],
         phase: float,
         step: float | None = None,
-    ) -> tuple[Floats, list[Revolution]]:
+    ) -> tuple[Floats, list[Any]]:
         """Derivative (2 n,) by the parameter of the residual of a period, at a fixed beginning.
 
-        It is the difference of two flow maps over a step, a millionth of the range by default; those of the
-        second are returned with it.
+        It is the difference of two flow maps over a step; those of the second are returned with it.
         """
-        step = DIFFERENCE * self.span if step is None else step
-        here, there = self.at(value), self.at(value + step)
+        here = self.at(value)
+        step = here.tolerances.difference * self.span if step is None else step
+        there = self.at(value + step)
         begun = self.carry(motion, here, there)
         followed = there.follow(begun, states, len(revolutions), phase=phase)
         defect = self.carry(followed[-1].end, there, here) - self.carry(begun, there, here)
@@ -174,10 +176,10 @@ class Family:
 
     def _make_room(self) -> None:
         """Give up the cases that have not been used for longest, unless there are few, or room for them."""
-        room = ROOM - sum(map(_size, self._cases.values()))  # they grow while they are used
+        room = ROOM - sum(case.nbytes for case in self._cases.values())  # they grow while they are used
         while room < 0 and len(self._cases) > MOST_KEPT:
             case = self._cases.popitem(last=False)[1]
-            room += _size(case)
+            room += case.nbytes
             if self.along == "friction":  # contact modes of one friction in a shared set-up
                 case.setup.forget(float(case.bodies.friction[0]))
 
@@ -252,17 +254,9 @@ class Family:
                 reduced=self._reduced(model, spin),
                 is_measured=is_measured,
             )
-            if not isinstance(setup, ModalSetup) or setup.scheme is not Scheme.EVENT_DRIVEN:
-                raise InputError(
-                    f"{self.along}: branches need motion in closed form between events; use method modal, "
-                    "normal fixed, stators of linear geometry, and friction_law sliding or coulomb"
-                )
+            if not isinstance(setup, ModalSetup):
+                raise InputError(f'{self.along}: branches need [integrator] method = "modal"')
             self._setups[key] = setup
             if len(self._setups) > MOST_KEPT:
                 self._setups.popitem(last=False)
         return self._setups[key]
-
-
-def _size(case: PiecewiseMotion) -> float:
-    """Bytes of its tables and modes."""
-    return WITH_MODES * sum(table.nbytes for table in case.march.tables if isinstance(table, np.ndarray))

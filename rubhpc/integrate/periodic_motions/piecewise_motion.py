@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from rubhpc.integrate.periodic_motions.revolution import (
     whole_revolutions,
 )
 from rubhpc.integrate.periodic_motions.saltation import carried, monodromy
+from rubhpc.integrate.periodic_motions.tolerances import TO_ROUNDING
 from rubhpc.kernels.flow import Timing, piece_room
 from rubhpc.kernels.friction_states import STUCK, state_of
 from rubhpc.kernels.revolutions import (
@@ -54,6 +55,7 @@ Change = Literal["touch", "release", "slip", "stick"]
 MOST_EVENTS = 1000  # in a revolution
 FEW_MODES = 4  # that others have read before, and that are read at once
 FEW_PIECES = 32  # that there is room for at first
+WITH_MODES = 2.2  # bytes of tables and modes, as solved and for pieces, over those of tables
 STEPS_PER_REVOLUTION = 128  # at least, so that no turn of a gap between two steps is missed
 
 
@@ -82,6 +84,9 @@ class PiecewiseMotion:
     march : EventDrivenMarch, optional
         Of the case, that is needed no more: it is started anew, unless it stands where the case begins.
     """
+
+    is_exact: ClassVar[Literal[True]] = True
+    tolerances: ClassVar = TO_ROUNDING
 
     def __init__(
         self,
@@ -122,6 +127,11 @@ class PiecewiseMotion:
         """Root of v'v + spin^2 u'u of a reduced motion (2 n,), in which the mass matrix is the identity."""
         velocity, displacement = motion[self.n :], self.setup.spin * motion[: self.n]
         return math.sqrt(velocity @ velocity + displacement @ displacement)
+
+    @property
+    def nbytes(self) -> float:
+        """Bytes of its tables and modes."""
+        return WITH_MODES * sum(table.nbytes for table in self.march.tables if isinstance(table, np.ndarray))
 
     def mode(self, states: int) -> Mode:
         """Contact mode with these states, solved where it is new.

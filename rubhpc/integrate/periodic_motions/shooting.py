@@ -200,7 +200,6 @@ def _shoot_by_revolutions(
         usual = abs(followed.setup.spin * followed.bodies.clearance)
         grazing = _grazing(search.revolutions, usual)
         raise NotConverged(f"{problem} at a residual of {search.residual:.2g}{grazing}")
-    search.finish()
     revolutions = search.revolutions[: search.shortest()]
     return Orbit(
         motion=search.motion,

@@ -44,7 +44,7 @@ class Search:
         """Follow the beginning; `Unfollowed` where it cannot be."""
         self._case, self._period, self._most_events = followed, period, most_events
         self.motion, self.states, self.iterations = motion, states, 0
-        self.revolutions = self._follow(motion, states, has_derivative=False)
+        self.revolutions = self._follow(motion, states)
         self.residual = self._residual(motion, self.revolutions)
         self._matrix: Floats | None = None  # derivative of the residual
         self._differs = np.inf  # how far from the present motion that derivative was found, over its size
@@ -70,10 +70,11 @@ class Search:
                 self._matrix = None
         return ""
 
-    def finish(self) -> None:
-        """Have the derivatives of the revolutions, of a motion as near as multipliers need."""
-        if self._matrix is None or self._differs > NEAR:
-            self._find_derivative()
+    def monodromy(self, period: int) -> Floats:
+        """Derivative (2 n, 2 n) of the motion after a period, of one as near as multipliers need."""
+        if self._matrix is None or self._differs > NEAR or period < self._period:
+            return self._case.monodromy(self.revolutions[:period])
+        return np.eye(self.motion.size) - self._matrix
 
     def shortest(self) -> int:
         """Revolutions after which the motion closes: a divisor of the period."""
@@ -84,24 +85,16 @@ class Search:
         return self._period
 
     def _find_derivative(self) -> Floats:
-        self.revolutions = self._follow(self.motion, self.states, has_derivative=True)
-        self._derivatives = [revolution.derivative for revolution in self.revolutions]
-        self._matrix, self._differs = np.eye(self.motion.size) - self.monodromy(self._period), 0.0
+        self._matrix = np.eye(self.motion.size) - self._case.monodromy(self.revolutions)
+        self._differs = 0.0
         return self._matrix
-
-    def monodromy(self, period: int) -> Floats:
-        """Derivative (2 n, 2 n) of the motion after a period by the beginning."""
-        columns = np.eye(self.motion.size)
-        for derivative in self._derivatives[:period]:
-            columns = derivative @ columns
-        return columns
 
     def _improve(self, step: Floats, least_step: float) -> bool:
         share = 1.0
         while share >= least_step:
             motion = self.motion + share * step
             try:
-                revolutions = self._follow(motion, self.revolutions[-1].states, has_derivative=False)
+                revolutions = self._follow(motion, self.revolutions[-1].states)
             except Unfollowed:
                 share *= 0.5
                 continue
@@ -113,10 +106,8 @@ class Search:
             share *= 0.5
         return False
 
-    def _follow(self, motion: Floats, states: int, *, has_derivative: bool) -> list[CollocatedRevolution]:
-        return self._case.follow(
-            motion, states, self._period, self._most_events, has_derivative=has_derivative
-        )
+    def _follow(self, motion: Floats, states: int) -> list[CollocatedRevolution]:
+        return self._case.follow(motion, states, self._period, self._most_events)
 
     def _residual(self, motion: Floats, revolutions: list[CollocatedRevolution]) -> float:
         return self._case.size(revolutions[-1].end - motion) / max(

@@ -597,7 +597,7 @@ def advance_by_collocation(
                         solution,
                         trail,
                     )
-                    note_least(nodes, state, solution.guess, trail)
+                    note_least(nodes, taken / whole, allowed * largest, state, solution.guess, trail)
                 if taken == whole:
                     end_of_step(bodies, tables, slot, x, solution.load, after)
                 else:

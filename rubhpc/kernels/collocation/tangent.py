@@ -50,6 +50,7 @@ Flags = NDArray[np.bool_]
 DIFFERENCE = 1e-6  # of the size of a local motion: difference for the derivative of impulses
 N_EVENT, FULL = range(2)  # items of `count`
 PAIR, KIND, BEFORE, AFTER = range(4)  # columns of `event`
+HIGH, LOW = range(2)  # rows of `swing`
 
 
 class Trail(Struct):
@@ -63,6 +64,7 @@ class Trail(Struct):
     )
     count: Ints  # (2,), number of events, and 1 where there was no room for another
     least: Floats  # (2, q), smallest gap, m, and force, N, where they turn between events
+    swing: Floats  # (2, q), largest force since it turned or began, and smallest since then, N
     before: Floats  # (nx,), coordinates before an event
     state: Ints  # (q,), states before it
     column: Floats  # (nx,), work space
@@ -341,26 +343,38 @@ def fill_kicks(bodies: Bodies, s: int, least: float, solution: Solution, trail: 
 
 
 @linked_sum
-def note_least(nodes: Nodes, state: Ints, force: Floats, trail: Trail) -> None:
-    """Note forces that turn within a step, where they are smallest."""
-    s = nodes.at.size
+def note_least(nodes: Nodes, taken: float, seen: float, state: Ints, force: Floats, trail: Trail) -> None:
+    """Note forces that turn, where they are smallest, in the part of a step that is taken.
+
+    A force turns where it has fallen and risen by more than is `seen`, N: less may be its error.
+    """
+    look, swing = taken / N_LOOK, trail.swing
     for i in range(state.size):
         if state[i] == OPEN:
             continue
-        lowest, is_inside = force[i, NORMAL, 0], False
-        for k in range(1, N_LOOK + 1):
-            value = value_at(nodes, force[i, NORMAL], k / N_LOOK)
-            if value < lowest:
-                lowest, is_inside = value, k < N_LOOK
-        if is_inside and force[i, NORMAL, s - 1] > lowest:
-            trail.least[1, i] = min(trail.least[1, i], lowest)
+        before = now = force[i, NORMAL, 0]
+        for k in range(N_LOOK + 1):
+            behind = value_at(nodes, force[i, NORMAL], min(k + 1, N_LOOK) * look)
+            bend, value = before - 2.0 * now + behind, now
+            if now < before and now < behind:
+                value -= 0.125 * (behind - before) ** 2 / bend
+            if value >= swing[HIGH, i]:
+                swing[HIGH, i] = swing[LOW, i] = value
+            elif value < swing[LOW, i]:
+                swing[LOW, i] = value
+            elif min(value, swing[HIGH, i]) > swing[LOW, i] + seen:
+                trail.least[1, i] = min(trail.least[1, i], swing[LOW, i])
+                swing[HIGH, i] = swing[LOW, i] = value
+            before, now = now, behind
 
 
 @linked_sum
 def note_event(
     pair: int, kind: int, before: int, after: int, tick: int, approach: float, trail: Trail
 ) -> None:
-    """Note an event, unless there is no room."""
+    """Note an event, unless there is no room; a force that begins has not turned yet."""
+    if before == OPEN:
+        trail.swing[HIGH, pair] = -np.inf
     k = trail.count[N_EVENT]
     if k == trail.tick.size:
         trail.count[FULL] = 1

@@ -194,7 +194,7 @@ def test_several_pairs_that_slide_under_coulombs_law_branch_as_pairs_that_slide(
         ({"largest_step": "-1 um"}, "largest_step: -1 um is out of range"),
         ({"clearance": 1e-4}, "clearance: varies along the branch"),
         ({"start": "1 kg"}, "branch: start: "),
-        ({"normal": "updated"}, "branches need motion in closed form"),
+        ({"method": "central-difference"}, "branches need .integrator. method"),
         ({"along": "clearance_ratio", "start": 0.9, "stop": -0.2}, "clearance_ratio must be at least 0"),
         ({"along": 3}, 'branch: along: 3 is not the name of an axis; give one, such as "friction"'),
         ({"keep": 1}, "branch: keep: 1 is not a list of names"),

@@ -12,6 +12,7 @@ from rubhpc.integrate.branches.arclength import Track
 from rubhpc.integrate.branches.events import Event
 from rubhpc.integrate.branches.search import refined
 from rubhpc.integrate.periodic_motions.shooting import NotConverged
+from rubhpc.integrate.periodic_motions.tolerances import TO_ROUNDING
 
 
 class Curve:
@@ -35,9 +36,13 @@ class Curve:
             revolutions=[SimpleNamespace(least_gap=least, least_force=np.array([np.inf]))],
             pieces=[],
             case=SimpleNamespace(
-                q=1, setup=SimpleNamespace(spin=1.0), bodies=SimpleNamespace(clearance=np.ones(1))
+                q=1, setup=SimpleNamespace(spin=1.0), bodies=SimpleNamespace(clearance=np.ones(1)),
+                tolerances=TO_ROUNDING,
             ),
         )  # fmt: skip
+
+    def located(self, point):
+        return point.case.tolerances.located
 
     def difference(self, a, b):
         return np.array([b.motion[0] - a.motion[0], b.value - a.value])
