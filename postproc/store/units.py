@@ -64,7 +64,7 @@ _SHORT = {
     "multiplier_angle": "Angle of the largest multiplier",
     "stick_fraction": "Fraction of contact without slip",
     "settled": "Settled before the record",
-    "left_closed_form": "Changes to short steps",
+    "left_closed_form": "Changes to collocation",
     "carrier_displacement": "Peak carrier displacement",
     "modal_error": "Error by modes left out",
     "peak_torsion": "Peak torsion",

@@ -66,7 +66,6 @@ class ModalSetup:
     reduced: ReducedModel
     spin: float  # rad/s
     step: float  # s, up to which steps need no bound
-    contact_step: float  # s, in contact without a closed form
     samples_per_revolution: int
     is_updated: bool  # normal
     displacement_limit: float  # m

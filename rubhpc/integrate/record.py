@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rubhpc.schema import DONE, STATUS, VARIABLES, lyapunov_variables, probe_variables
+from rubhpc.schema import DONE, SCHEMES, STATUS, VARIABLES, lyapunov_variables, probe_variables
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -156,9 +156,6 @@ class State:
 MOST_RESIDUAL = 0.01  # of the energy balance: a larger one is reported
 
 
-MOST_LEFT_RESIDUAL = 1e-4  # the same for a case that left closed form for short steps
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Record(RecordVariables):
     """One simulated case; every stored variable is an attribute (`record.vertical`, `record.period`).
@@ -237,10 +234,10 @@ class Record(RecordVariables):
         """Why the case diverged, or what is wrong with its result; "" where nothing is."""
         residual = self.measures.get("energy_residual", 0.0)
         texts = [text for text in (self.reason, self.note) if text]
-        has_left = self.measures.get("left_closed_form", 0) > 0
-        if not self.reason and residual > (MOST_LEFT_RESIDUAL if has_left else MOST_RESIDUAL):
-            left = "with its short steps " if has_left else ""
-            texts.append(f"{left}its energy balance is off by {100 * residual:.2g} %; use a shorter step")
+        if not self.reason and residual > MOST_RESIDUAL:
+            is_stepped = SCHEMES[self.measures.get("scheme", 0)] == "central_difference"
+            fix = "a shorter step" if is_stepped else "a smaller accuracy"
+            texts.append(f"its energy balance is off by {100 * residual:.2g} %; use {fix}")
         if not self.reason and self.advice:
             texts.append(self.advice)
         return "; ".join(texts)

@@ -180,7 +180,6 @@ def prepare(
             free_spin=free_spin,
             spin=speed,
             step=SEARCH_STEP if integrator.step is None else integrator.step,
-            contact_step=integrator.contact_step(contact),
             accuracy=integrator.accuracy,
             samples_per_revolution=samples_per_revolution,
             is_updated=is_updated,

@@ -38,7 +38,7 @@ from rubhpc.kernels.trail import note_after, note_event
 Floats = NDArray[np.float64]
 
 LEAVING = 1e-3  # of the cone, within which friction is a tick before it is outside
-MOST_EVENTS = 65536  # in a revolution; more are left to short steps
+MOST_EVENTS = 65536  # in a revolution; more are left to collocation
 
 
 @linked_sum

@@ -13,7 +13,7 @@ Ints = NDArray[np.int64]
 
 MOST_BYTES = 2**25  # of a trail
 MOST_EVENTS = 2**14
-BROKEN = -1  # instead of the number of events: there was no room for all, or short steps between them
+BROKEN = -1  # instead of the number of events: there was no room for all, or collocation between them
 
 
 class Trail(Struct):

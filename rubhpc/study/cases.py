@@ -407,7 +407,7 @@ def _named(study: Study) -> Iterator[None]:
 
 
 _EVENT_STEPS = 60  # that the modal scheme takes a revolution, samples apart
-_TOUCHING = 0.15  # share of the time in contact, where it takes short steps there
+_COLLOCATION = 4.0  # cost of a revolution without closed form over that of one with it
 
 
 def predicted_steps(points: OperatingPoints) -> NDArray[np.float64]:
@@ -425,12 +425,10 @@ def _steps_of(points: OperatingPoints, index: Index) -> float:
     if study.changes_speed:
         return float(points.speed_law(index).n_revolution * per_revolution)
     modal_steps = recording.longest_transient * _EVENT_STEPS + recording.revolutions * per_revolution
-    is_modal = study.integrator.method == "modal"
-    if is_modal and (contact.closed_form == "always" or contact.is_smooth):
-        return float(modal_steps)
+    if study.integrator.method == "modal":
+        is_closed = contact.closed_form == "always" and not study.has_bent_stator
+        return modal_steps if is_closed else _COLLOCATION * modal_steps
     like = index if points.has_few_rigs else (0,) * len(points.points.dims)
     turns = recording.longest_transient + recording.revolutions
     duration = turns * 2 * math.pi / points.speed_of(index, like)
-    if is_modal:
-        return modal_steps + _TOUCHING * duration / study.integrator.contact_step(contact)
     return duration / study.integrator.step_within(points.step_limit(like))

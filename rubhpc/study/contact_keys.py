@@ -135,11 +135,6 @@ class ContactKeys:
                 raise FieldError(key, f"{problem}; remove one of them")
 
     @property
-    def is_smooth(self) -> bool:
-        """Whether forces follow from closed gaps alone: multipliers under steady sliding."""
-        return self.law == "lagrange" and self.friction_law == "sliding"
-
-    @property
     def closed_form(self) -> ClosedForm:
         """When the modal scheme has a closed form of contact; elsewhere it is collocation."""
         return "always" if self.normal == "fixed" and self.are_laws_closed else "never"

@@ -22,7 +22,6 @@ SAFE_SHARE = 0.9  # of the stability limit
 SEARCH_STEP = 1e-6  # s, of the modal scheme with the fixed normal
 SALTELLI, FEWEST_POINTS = "sobol", 8  # the design that Sobol' indices need
 _IN_SEQUENCE = ("sobol-sequence", "random")  # methods that draw one point after the other
-TURNING_STEP = 0.25e-6  # s, where it takes short steps of contact
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,14 +59,6 @@ class Integrator:
 
     def __post_init__(self) -> None:
         check_fields(self)
-
-    def contact_step(self, contact: Contact) -> float:
-        """Step in contact, s, of the modal scheme."""
-        if self.step is not None:
-            return self.step
-        laws = contact.closed_form, contact.friction_law, contact.law
-        is_steady = laws == ("always", "sliding", "lagrange")
-        return SEARCH_STEP if is_steady else TURNING_STEP
 
     def step_within(self, limit: float) -> float:
         """Time step, s, of the central difference for matrices that are stable up to `limit`, s."""

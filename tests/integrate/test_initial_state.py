@@ -156,7 +156,7 @@ def test_what_a_penalty_overlaps_stays_and_what_a_wall_adds_goes():
     assert gap[0] == pytest.approx(-state.overlap[0], abs=1e-12)
 
 
-# Short steps are of first order; without its overlap the shaft falls by 0.1 mm.
+# The central difference is of second order; without its overlap the shaft falls by 0.1 mm.
 @pytest.mark.parametrize(("method", "moves"), [("modal", 1e-9), ("updated", 1e-7), ("central", 1e-7)])
 def test_rest_under_a_penalty_is_an_equilibrium(method, moves):
     """The stator carries its share of the weight, and a knock that is none moves nothing."""

@@ -29,7 +29,7 @@ def compile_once() -> None:
     stamp = CACHES / "compiled"
     if _is_current(stamp):
         return
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(Path(__file__).parent)])}
     environment.pop("NUMBA_CACHE_DIR", None)
     command = [sys.executable, __file__, *SCHEMES]
     if subprocess.run(command, env=environment, cwd=ROOT, check=False).returncode:

@@ -84,7 +84,6 @@ def set_up_modal(rotor, stators, spin, per_revolution, contact, *, force=None, l
         reduced=reduce_model(model, spin, 1e-3),
         spin=spin,
         step=step,
-        contact_step=step,
         samples_per_revolution=per_revolution,
         is_updated=contact.normal == "updated",
         displacement_limit=math.inf,

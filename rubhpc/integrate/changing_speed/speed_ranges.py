@@ -104,7 +104,6 @@ class SpeedRanges:
             reduced=reduced,
             spin=speed,
             step=fastest.step,
-            contact_step=fastest.contact_step,
             samples_per_revolution=fastest.samples_per_revolution,
             is_updated=fastest.is_updated,
             law=fastest.law,

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 LOST, LEAST = 100.0, 1e-10  # of the overlap that is allowed; m
-MOST_STEPS = 20.0  # of a piece, over those of short steps: with more, its events have no end
+MOST_STEPS = 20.0  # of a piece, over those of the event search: with more, its events have no end
 
 
 class EventDrivenMarch(ContactSets):
@@ -76,7 +76,7 @@ class EventDrivenMarch(ContactSets):
             return False
         gap = bodies.clearance[:q] + bodies.gap_jacobian @ motion[: motion.size // 2]
         deepest = float(gap[~closed].min(initial=0.0))
-        is_endless = n_step > MOST_STEPS * lasts / self._setup.contact_step
+        is_endless = n_step > MOST_STEPS * lasts / self._setup.step
         return is_endless or deepest < -LOST * max(bodies.overlap, LEAST)
 
     def keep_fast(self, before: tuple[int, Floats], spin: float, since: float) -> None:

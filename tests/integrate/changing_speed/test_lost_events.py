@@ -28,7 +28,7 @@ def test_an_open_pair_that_overlaps_has_missed_an_event(overlap):
     is_open, is_closed, lasts = np.array([False]), np.array([True]), 0.01
     assert march.has_lost_events(100, lasts, motion, is_open) == (overlap > 0.0)
     assert not march.has_lost_events(100, lasts, motion, is_closed)
-    assert march.has_lost_events(int(21 * lasts / setup.contact_step), lasts, motion, is_closed)
+    assert march.has_lost_events(int(21 * lasts / setup.step), lasts, motion, is_closed)
 
 
 @pytest.mark.parametrize(
