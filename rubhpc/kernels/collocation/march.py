@@ -330,6 +330,15 @@ def bind_pairs(
 
 
 @linked_sum
+def acceleration_of(nodes: Nodes, step: float, seen: Floats) -> float:
+    """Largest mean acceleration (m/s2) of a gap in a step, from its rates at the nodes."""
+    largest = 0.0
+    for k in range(1, nodes.at.size):
+        largest = max(largest, abs(seen[k, RATE] - seen[0, RATE]) / (nodes.at[k] * step))
+    return largest
+
+
+@linked_sum
 def begin_trial(bodies: Bodies, s: int, i: int, is_still: bool, case: CaseState, solution: Solution) -> int:
     """Return the state that is tried first for a pair that may stick."""
     see_start(bodies, case.x, solution)
@@ -576,6 +585,10 @@ def advance_by_collocation(
             taken = whole
             if place <= 1.0:
                 taken = int(place * whole + 0.5)
+                if state[pair] == OPEN:
+                    acceleration = acceleration_of(nodes, step, solution.seen[pair * s : pair * s + s])
+                    if solution.seen[pair * s, RATE] > 0.0:
+                        taken = max(taken, 1)  # what opens does not touch at once: such touches have no end
             else:
                 pair = -1
             if progress.tick + taken > last_tick:
