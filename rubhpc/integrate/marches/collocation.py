@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 WHY = {  # a case cannot continue
+    0: "the motion diverges",
     JAMMED: "friction presses a closed gap further closed (Painleve's paradox): lower the friction",
     UNCONVERGED: "the contact forces of the shortest step were not found",
     ENDLESS: "events follow without end",

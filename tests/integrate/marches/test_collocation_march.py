@@ -7,6 +7,7 @@ import corpus
 import numpy as np
 import pytest
 from closed_form import read_rig, run_up, simulate
+from contact_answers import masses
 from independent_contact import run
 from record_distance import MOTIONS
 from reference_bodies import squared_slope
@@ -293,6 +294,21 @@ def test_elastic_impacts_keep_the_energy():
     assert record.contacts_per_revolution == pytest.approx([2 * math.pi / 3 / 4e-2] * 2, rel=0.02)
     energy = 0.5 * record.final.rotor_velocity[0] ** 2 + 2.0 * record.final.rotor_displacement[0] ** 2
     assert energy == pytest.approx(0.5, rel=1e-10)
+
+
+@pytest.mark.parametrize("restitution", [0.2, 0.5, 0.9])
+def test_rebounds_beside_closed_pairs_have_an_end(restitution):
+    """A ring in which one pair bounces while others are pressed."""
+    rig = masses(8, stiffness=1e6, radius=0.06)
+    given = {"speed_ratio": 1.5, "clearance": 70e-6, "friction": 0.3, "friction_law": "coulomb"}
+    given |= {"normal": "updated", "restitution": restitution, "transient": 0, "revolutions": 1}
+    found, fine = (simulate(rig, **given, accuracy=accuracy) for accuracy in (1e-3, 1e-5))
+    assert found.reason == fine.reason == ""
+    assert found.energy_residual < 1e-4
+    assert found.contact_impulse == pytest.approx(fine.contact_impulse, abs=1e-3 * fine.contact_impulse.max())
+    assert found.peak_contact_force == pytest.approx(
+        fine.peak_contact_force, abs=1e-3 * fine.peak_contact_force.max()
+    )
 
 
 def test_a_pair_sticks_on_a_gap_that_is_not_quite_closed():
