@@ -114,7 +114,8 @@ class Stator(Seat):
     damping: Damping = table(doc="Rayleigh damping.", default=UNDAMPED)
     geometry: str | None = choice(
         doc="Whether a stator that bends keeps its length along its axis (linear), or its tip draws back and "
-        f"an axial force lowers its lateral stiffness (second_order); by default {default_of('geometry')}.",
+        f"an axial force lowers its lateral stiffness (second_order); by default {default_of('geometry')}, "
+        "on a carrier linear.",
         example='"second_order"',
         of=(LINEAR, SECOND_ORDER),
         default=None,
@@ -136,7 +137,13 @@ class Stator(Seat):
     @property
     def is_bent(self) -> bool:
         """Whether its gap knows that it bends: second order of a stator that is free to."""
-        return self.lateral and (self.geometry or default_of("geometry")) == SECOND_ORDER
+        return self.lateral and self.with_geometry(default_of("geometry")).geometry == SECOND_ORDER
+
+    def with_geometry(self, geometry: str) -> Stator:
+        """Return the stator with a geometry where it gives none; on a carrier this is linear."""
+        if self.geometry is not None:
+            return self
+        return replace(self, geometry=geometry if self.carrier is None else LINEAR)
 
     @property
     def carrier_problem(self) -> str:
