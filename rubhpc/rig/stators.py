@@ -114,8 +114,7 @@ class Stator(Seat):
     damping: Damping = table(doc="Rayleigh damping.", default=UNDAMPED)
     geometry: str | None = choice(
         doc="Whether a stator that bends keeps its length along its axis (linear), or its tip draws back and "
-        f"an axial force lowers its lateral stiffness (second_order); by default {default_of('geometry')}, "
-        "on a carrier linear.",
+        f"an axial force lowers its lateral stiffness (second_order); by default {default_of('geometry')}.",
         example='"second_order"',
         of=(LINEAR, SECOND_ORDER),
         default=None,
@@ -130,9 +129,6 @@ class Stator(Seat):
                 raise FieldError(name, f'missing; add {name} = "5 mm", or diameter for a round stator')
             if side is not None and self.diameter is not None:
                 raise FieldError(name, "conflicts with diameter; remove one of them")
-        if self.geometry == SECOND_ORDER and self.carrier is not None:
-            problem = "second_order needs a stator on the ground, and this one stands on a carrier"
-            raise FieldError("geometry", f'{problem}; set geometry = "linear", or remove carrier')
 
     @property
     def is_bent(self) -> bool:
@@ -140,10 +136,8 @@ class Stator(Seat):
         return self.lateral and self.with_geometry(default_of("geometry")).geometry == SECOND_ORDER
 
     def with_geometry(self, geometry: str) -> Stator:
-        """Return the stator with a geometry where it gives none; on a carrier this is linear."""
-        if self.geometry is not None:
-            return self
-        return replace(self, geometry=geometry if self.carrier is None else LINEAR)
+        """Return the stator with a geometry where it gives none."""
+        return self if self.geometry is not None else replace(self, geometry=geometry)
 
     @property
     def carrier_problem(self) -> str:

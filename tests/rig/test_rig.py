@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from rubhpc.errors import InputError
-from rubhpc.rig.carriers import Carrier
 from rubhpc.rig.parts import Bearing, Damping, Disc, Torsion
 from rubhpc.rig.reading import PACKAGED, packaged_rigs, read_rig, rig_from_dict, with_keys
 
@@ -49,15 +48,9 @@ def test_a_carrier_that_is_mistyped_is_named(tmp_path):
         read_rig(tmp_path / "a.toml")
 
 
-def test_a_beam_bends_to_second_order_by_default_and_on_a_carrier_linearly(rig):
-    casing = Carrier(name="casing", mass=1.0, stiffness=1e6)
-    on_it = replace(rig, carrier=(casing,), stator=(replace(rig.stator[0], carrier="casing"),))
+def test_a_beam_that_is_free_to_bends_to_second_order_by_default(rig):
     held = replace(rig, stator=(replace(rig.stator[0], lateral=False),))
-    assert [one.stator[0].is_bent for one in (rig, on_it, held)] == [True, False, False]
-    assert on_it.with_geometry("second_order").stator[0].geometry == "linear"
-    assert (
-        rig_from_dict(json.loads(json.dumps(on_it.as_dict()))).stator == on_it.with_geometry("linear").stator
-    )
+    assert [one.stator[0].is_bent for one in (rig, held, rig.with_geometry("linear"))] == [True, False, False]
 
 
 def test_inertia_of_a_disc_is_the_integral_over_its_points():
