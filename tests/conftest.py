@@ -62,7 +62,6 @@ SLOW = (
     "integrate/marches/test_event_driven_march.py::test_dry_whip_diverges_and_says_so",
     "integrate/marches/test_event_driven_march.py::test_endless_events_are_left_to_collocation",
     "integrate/marches/test_event_driven_march.py::test_shorter_kernel_calls_change_nothing_but_rounding",
-    "integrate/reduced_model/test_friction_mode.py::test_tables_hold_rates",
     "integrate/test_compilation.py::test_a_first_case_compiles_no_more_than_it_did",
     "integrate/test_independent_contact.py",
     "integrate/test_initial_state.py",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.integrate.case import march_of
+from rubhpc.integrate.case import MARCHES
 from rubhpc.integrate.changing_speed.range_library import RangeLibrary
 from rubhpc.integrate.marches.collocation import CollocationMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
@@ -56,7 +56,7 @@ def carried(before: Ended, jump: float, march: EventDrivenMarch, setup: PieceSet
         At the beginning of the next piece.
     """
     (mask, z), old, next_ = before.left, before.setup, march.library
-    if mask != march.moved_by(march.mask) or not isinstance(next_, RangeLibrary):
+    if mask != march.mask or not isinstance(next_, RangeLibrary):
         return None
     place = _inside(setup.held.within(old.spin))
     common = setup.held.reduced.spin + place * setup.held.reach
@@ -170,7 +170,7 @@ def take_stretch(
         n_part_sample=part,
         energy_limit=block.held.template.energy_limit,
         at=np.array([first, 0, TO_BEGIN, march.mask]),
-        moved_by=march.moved_by(-1) if library.follows(march.mask) else 0,
+        follows=library.follows(march.mask),
         left=march.reached_in()[1],
         motion=np.zeros((n_piece + 1, 2 * n)),
         pressing=np.zeros((n_piece + 1, q)),
@@ -216,7 +216,7 @@ def take_stretch(
         last=Accumulator._make(field[end * n_part] for field in sums),
         n_step=int(pieces.n_step.sum()),
         end=Place(pieces.motion[end].copy(), model.sag, pieces.pressing[end].copy()),
-        left=(march.moved_by(int(pieces.at[STANDING])), pieces.left),
+        left=(int(pieces.at[STANDING]), pieces.left),
     )
 
 
@@ -369,7 +369,7 @@ class Passing:
                 return march
             march.begin(setup, begun)
         else:
-            made = march_of(setup.scheme, setup)(setup, *self._case, state_at(begun, setup), self._check)
+            made = MARCHES[setup.scheme](setup, *self._case, state_at(begun, setup), self._check)
             assert isinstance(made, EventDrivenMarch | CollocationMarch)
             self._march = march = made
             if goes_on and isinstance(march, EventDrivenMarch):

@@ -10,7 +10,8 @@ import numpy as np
 from rubhpc.integrate.marches.march import ALL_SAMPLES, NO_FORCES
 from rubhpc.integrate.marches.modal import ModalMarch
 from rubhpc.integrate.measuring.samples import no_record
-from rubhpc.kernels.case_progress import LONG_AGO, PAUSED, follow, restart_clock, shaft_turn
+from rubhpc.integrate.overlaps import with_overlap
+from rubhpc.kernels.case_progress import LONG_AGO, PAUSED, restart_clock, shaft_turn
 from rubhpc.kernels.collocation.flight import LEAST_GAP
 from rubhpc.kernels.collocation.march import LEAST_SCALE, SETTLED, advance_by_collocation
 from rubhpc.kernels.collocation.observing import Seen
@@ -29,8 +30,6 @@ if TYPE_CHECKING:
     from rubhpc.integrate.record import State
     from rubhpc.integrate.reduced_model.flight_modes import FlightModes
     from rubhpc.kernels.accumulators import Accumulator, Samples
-    from rubhpc.kernels.case_progress import Clock, Progress
-    from rubhpc.kernels.sampling import Recorder
 
     Floats = NDArray[np.float64]
 
@@ -48,7 +47,7 @@ class CollocationMarch(ModalMarch):
     ) -> None:
         """Start from `initial`, with the contacts closed that its forces press."""
         super().__init__(setup, clearance, friction, initial, check)
-        self._friction = friction
+        self._friction, self._at_clearance = friction, clearance
         self._seen: Seen | None = None
         self._sizes: tuple[object, ...] = ()
         self.accuracy = setup.accuracy
@@ -181,31 +180,14 @@ class CollocationMarch(ModalMarch):
         """State of each pair, (q,)."""
         return self._case.state.copy()
 
-    def take_over(
-        self,
-        clock: Clock,
-        progress: Progress,
-        recorder: Recorder,
-        motion: Floats,
-        closed: NDArray[np.bool_],
-    ) -> None:
-        """Continue the record of another march at its tick, with its motion (2 n,) and closed pairs (q,)."""
-        self.clock, self._recorder = clock, recorder
-        follow(self.progress, progress)
-        self._motion[:] = motion
-        self._begin(closed.astype(float), shaft_turn(clock, self.progress.tick))
-
-    def advance_to(
-        self, last_tick: int, clock: Clock, samples: Samples, accumulator: Accumulator, is_recorded: bool
-    ) -> int:
-        """Advance to a tick for another march; returns an outcome of `kernels.case_progress`."""
-        self.clock = clock
-        return self._kernel(last_tick, samples, accumulator, is_recorded)
-
     def motion(self) -> Floats:
         """Reduced displacements, then velocities (2 n,), at the sample reached."""
         motion: Floats = self._modes.motion @ self._case.x
         return motion
+
+    def state_of(self, motion: Floats, contact_force: Floats) -> State:
+        """State of a reduced motion (2 n,), with the overlap of its gaps: springs press by it."""
+        return with_overlap(super().state_of(motion, contact_force), self._setup, self._at_clearance)
 
     def touching(self) -> NDArray[np.bool_]:
         """Whether each pair is closed, (q,)."""

@@ -156,10 +156,6 @@ class ModalMarch(March):
         """Reduced displacements, then velocities (2 n,), at the sample reached."""
         return self._motion_in(self._bare_progress["mode"], self._z)
 
-    def motion_of(self, progress: Progress, z: Floats) -> Floats:
-        """Reduced displacements, then velocities (2 n,), of modal coordinates (2, m)."""
-        return self._motion_in(progress.mode, z)
-
     def _motion_in(self, mode: int, z: Floats) -> Floats:
         motion: Floats = self.tables.motion_re[mode] @ z[0] - self.tables.motion_im[mode] @ z[1]
         return motion
