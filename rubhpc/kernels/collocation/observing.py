@@ -445,8 +445,8 @@ def record_contact(
         for k in range(s):
             part[k] *= t[k]
         worked = step * integral_of(nodes, part, 0.0, share)
-    else:
-        lowest = 0.0
+    if state[i] == STICKING or (state[i] == FORWARD and bodies.is_sticky):  # below zero it is an error
+        lowest = max(0.0, lowest) if state[i] == FORWARD else 0.0
     accumulator.least_slip[i] = min(accumulator.least_slip[i], lowest)
     accumulator.friction_work[i] += worked
     observe_rub(drive, worked, accumulator)
