@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.integrate.marches.march import ALL_SAMPLES, NO_FORCES
-from rubhpc.integrate.marches.modal import ModalMarch
+from rubhpc.integrate.marches.modal import ModalMarch, slowest_fast
 from rubhpc.integrate.measuring.samples import no_record
 from rubhpc.integrate.overlaps import with_overlap
 from rubhpc.kernels.case_progress import LONG_AGO, PAUSED, restart_clock, shaft_turn
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.record import State
     from rubhpc.integrate.reduced_model.flight_modes import FlightModes
+    from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
     from rubhpc.kernels.accumulators import Accumulator, Samples
 
     Floats = NDArray[np.float64]
@@ -100,6 +101,26 @@ class CollocationMarch(ModalMarch):
         self._memory["is_new"] = 0
         for name in ("slot", "scale", "fastest", "unseen"):
             self._memory[name] = memory[name]
+
+    @property
+    def mask(self) -> int:
+        """Set of contacts whose modes are the coordinates: none."""
+        return 0
+
+    @property
+    def library(self) -> ModeLibrary:
+        """Where the modes of a piece come from."""
+        return self._setup.library(0.0)
+
+    def reached_in(self) -> tuple[int, Floats]:
+        """The set of contacts `mask`, and a copy of the modal coordinates (2, m), of which none is real."""
+        return 0, self._case.x.reshape(2, -1).copy()
+
+    def keep_fast(self, before: tuple[int, Floats], spin: float, since: float) -> None:
+        """Let fast modes go on as they were before a piece (`EventDrivenMarch.keep_fast`)."""
+        z, fast = self._case.x.reshape(2, -1), np.abs(self._contacts.exponent) > slowest_fast(spin, since)
+        fast[-1] = False  # the response to the unbalance
+        z[:, fast] = before[1][:, : fast.size][:, fast]
 
     def start_again(self, state: State) -> bool:
         """Restart the same case at another state."""

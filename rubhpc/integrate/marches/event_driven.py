@@ -9,14 +9,13 @@ import numpy as np
 
 from rubhpc.integrate.marches.march import ALL_SAMPLES
 from rubhpc.integrate.marches.met_modes import MetModes, NoClosedForm
-from rubhpc.integrate.marches.modal import ModalMarch
+from rubhpc.integrate.marches.modal import ModalMarch, slowest_fast
 from rubhpc.integrate.measuring.samples import no_record
 from rubhpc.kernels.case_progress import FINISHED, MODE_WANTED, NO_SECTIONS, PAUSED, Sections, restart_clock
 from rubhpc.kernels.contact_modes import DYING, FORCED_LEVEL
 from rubhpc.kernels.event_loop import advance
 from rubhpc.kernels.mode_change import EventWork, change_contacts, event_work
 from rubhpc.kernels.piece_loop import advance_pieces
-from rubhpc.kernels.pieces import FAST, QUICK
 from rubhpc.kernels.sampling import Measured
 from rubhpc.kernels.trail import Trail, begin_trail, new_trail, no_trail
 
@@ -87,7 +86,7 @@ class EventDrivenMarch(ModalMarch):
         """
         mask, z = before
         if self.mask == mask:
-            self._keep(z, max(FAST * abs(spin), QUICK / since))
+            self._keep(z, slowest_fast(spin, since))
 
     def _keep(self, z: Floats, slowest: float) -> None:
         """Let modes with a pace above `slowest`, 1/s, have the coordinates (2, m)."""

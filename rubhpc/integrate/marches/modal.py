@@ -26,6 +26,7 @@ from rubhpc.kernels.case_progress import (
     restart_clock,
 )
 from rubhpc.kernels.contact_modes import enter_with, is_within
+from rubhpc.kernels.pieces import FAST, QUICK
 from rubhpc.kernels.sampling import recorder, with_coordinates
 
 if TYPE_CHECKING:
@@ -49,6 +50,11 @@ class Place(NamedTuple):
     motion: Floats  # (2 n,), reduced displacements about the sag, then velocities
     sag: Floats  # (n_rotor_dof,), m and rad
     contact_force: Floats  # (q,), N
+
+
+def slowest_fast(spin: float, since: float) -> float:
+    """Pace, 1/s, above which modes follow the speed from piece to piece (`kernels.pieces.begin_piece`)."""
+    return max(FAST * abs(spin), QUICK / since)
 
 
 class ModalMarch(March):
