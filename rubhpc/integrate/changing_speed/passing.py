@@ -13,7 +13,7 @@ from rubhpc.integrate.changing_speed.range_library import RangeLibrary
 from rubhpc.integrate.marches.collocation import CollocationMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.marches.met_modes import NoClosedForm
-from rubhpc.integrate.marches.modal import ModalMarch, Place
+from rubhpc.integrate.marches.modal import Place
 from rubhpc.integrate.measuring.samples import empty_samples, following_accumulator, stacked_accumulators
 from rubhpc.integrate.record import State
 from rubhpc.kernels.accumulators import Accumulator, Samples

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rubhpc.integrate.marches.march import ALL_SAMPLES, NO_FORCES
 from rubhpc.integrate.marches.modal import ModalMarch, slowest_fast
@@ -23,8 +24,6 @@ from rubhpc.kernels.sampling import Measured
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
     from rubhpc.integrate.marches.modal import Place
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.record import State
@@ -32,7 +31,17 @@ if TYPE_CHECKING:
     from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
     from rubhpc.kernels.accumulators import Accumulator, Samples
 
-    Floats = NDArray[np.float64]
+Floats = NDArray[np.float64]
+
+
+class Contacts(NamedTuple):
+    """Contacts of a case at the end of a piece."""
+
+    state: NDArray[np.int64]  # (q,)
+    force: Floats  # (q, 2, s), N
+    lasting: Floats  # (q,), s
+    age: Floats  # (q,), s, of the states
+    memory: NDArray[Any]  # (1,)
 
 
 class CollocationMarch(ModalMarch):
@@ -83,24 +92,33 @@ class CollocationMarch(ModalMarch):
     def begin(self, setup: ModalSetup, place: Place) -> None:
         """Begin anew at another speed in the same reduced coordinates, from where a march has come.
 
-        Contacts keep their states.
+        Contacts are those of the place.
         """
         self.n_step, self.sample, self._stride = 0, 0, ALL_SAMPLES
-        tick, state, memory = int(self.progress.tick), self._case.state.copy(), self._memory.copy()
-        force, lasting, age = (
-            self._case.force,
-            self._case.lasting,
-            (tick - self._case.since) * self.clock.tick,
-        )
         self._take(setup)
         self._motion[:] = self.moved(setup, place)
         self._use_modes(setup)
         self._begin(place.contact_force)
-        self._case.state[:], self._case.force[:], self._case.lasting[:] = state, force, lasting
-        self._case.since[:] = -np.round(age / self.clock.tick).astype(np.int64)
-        self._memory["is_new"] = 0
-        for name in ("slot", "scale", "fastest", "unseen"):
-            self._memory[name] = memory[name]
+        if place.contacts is not None:
+            contacts = cast("Contacts", place.contacts)
+            self._case.state[:], self._case.force[:] = contacts.state, contacts.force
+            self._case.lasting[:] = contacts.lasting
+            self._case.since[:] = -np.round(contacts.age / self.clock.tick).astype(np.int64)
+            self._memory["is_new"] = 0
+            for name in ("slot", "scale", "fastest", "unseen"):
+                self._memory[name] = contacts.memory[name]
+
+    def reached(self) -> Place:
+        """Present motion and contacts, for another speed to continue from."""
+        case = self._case
+        contacts = Contacts(
+            state=case.state.copy(),
+            force=case.force.copy(),
+            lasting=case.lasting.copy(),
+            age=(int(self.progress.tick) - case.since) * self.clock.tick,
+            memory=self._memory.copy(),
+        )
+        return super().reached()._replace(contacts=contacts)
 
     @property
     def mask(self) -> int:

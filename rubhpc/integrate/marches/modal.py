@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numba import config
@@ -50,6 +50,7 @@ class Place(NamedTuple):
     motion: Floats  # (2 n,), reduced displacements about the sag, then velocities
     sag: Floats  # (n_rotor_dof,), m and rad
     contact_force: Floats  # (q,), N
+    contacts: Any = None  # what the march keeps of its contacts besides
 
 
 def slowest_fast(spin: float, since: float) -> float:
