@@ -115,7 +115,7 @@ class CollocationMarch(ModalMarch):
             state=case.state.copy(),
             force=case.force.copy(),
             lasting=case.lasting.copy(),
-            age=(int(self.progress.tick) - case.since) * self.clock.tick,
+            age=(int(self.progress.tick) - case.since).astype(np.float64) * self.clock.tick,
             memory=self._memory.copy(),
         )
         return super().reached()._replace(contacts=contacts)

@@ -258,6 +258,7 @@ def test_a_law_of_constant_speed_is_a_simulation():
 
 
 DRIVEN = {"drive": {"start": 100.0, "torque": 1.0, "revolutions": 9}}
+SPRINGS, STICK = {"law": "penalty", "stiffness": 1e6}, {"friction_law": "coulomb"}
 
 
 @pytest.mark.parametrize("pieces", [None, 8])
