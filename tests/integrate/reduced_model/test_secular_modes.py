@@ -80,7 +80,7 @@ def test_motions_are_those_of_the_whole(kind, seed):
 
 def test_contacts_follow_one_another_in_any_order():
     stiffness, damping, row, across = rotor_and_stator(gyroscopic=5.0)
-    contacts = [Contact(row, row + 0.3 * across), Contact(across, across)]
+    contacts = [Contact(gap, gap + 0.3 * across) for gap in (row, np.roll(row, 2))]
     modes = opened(stiffness, damping)
     bodies = Closings(modes, np.zeros(N, dtype=int)).within(np.arange(N))
     one, other = bodies.with_contacts(contacts), bodies.with_contacts(contacts[::-1])
