@@ -13,6 +13,7 @@ import math
 from typing import Protocol
 
 import numpy as np
+from numba import config
 from numpy.typing import NDArray
 
 from rubhpc.kernels._struct import Struct
@@ -176,7 +177,8 @@ _RECORD = np.dtype(
 
 def new_memory() -> NDArray[np.void]:
     """Numbers (1,) of a case that begins."""
-    return np.zeros(1, _RECORD)
+    memory = np.zeros(1, _RECORD)
+    return memory.view(np.recarray) if config.DISABLE_JIT else memory  # type: ignore[attr-defined]
 
 
 def _lobatto(s: int) -> Floats:
