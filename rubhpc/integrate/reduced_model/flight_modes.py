@@ -221,6 +221,7 @@ class FlightModes:
             radius=radius,
             clearance=np.zeros(q),
             aside=self.sense * sag_at_stators(setup.model)[1],
+            space=self._space,
             rim_speed=radius * abs(setup.spin),
             friction=np.zeros(q),
             **normal_laws(setup.model, law),
@@ -230,6 +231,12 @@ class FlightModes:
             translations=self.rows(setup.reduced.translations @ self.shape[:n]),
             displacement_limit=setup.displacement_limit,
         )
+
+    @property
+    def _space(self) -> Floats:
+        angle = np.array([stator.angle for stator in self.setup.model.stators])
+        c, s = np.cos(angle), np.sin(angle)
+        return np.array([[c, -self.sense * s], [s, self.sense * c]]).transpose(2, 0, 1).copy()
 
     @cached_property
     def nodes(self) -> Nodes:

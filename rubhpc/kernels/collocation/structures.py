@@ -55,6 +55,7 @@ class Bodies(Struct):
     radius: Floats  # (q,), of the rim, m; of a bore its clearance, negative
     clearance: Floats  # (q,), along the axis at rest, m
     aside: Floats  # (q,), of the tip at rest from the axis through the disc, m
+    space: Floats  # (q, 2, 2), up and horizontally (rows), of what is along the axis and across it
     rim_speed: Floats  # (q,), m/s, not negative
     friction: Floats  # (q,), coefficient
     normal_law: Ints  # (q,), of `laws.NORMAL_LAWS`
