@@ -71,9 +71,10 @@ _WAVEFORMS = _of_signals("", "waveform", "sample", "{}")
 _SPECTRA = _of_signals("spectrum_", "spectrum", "order", "amplitude (zero to peak) of the {}")
 _SECTIONS = _of_signals("section_", "section", "section", "{}, once a revolution", "float64", SECTION_NAMES)
 
+CONTACT_ANGLE = "contact_angle"
 # Of records with a bore among the stators, besides the signals.
 _OF_BORES = (
-    ("contact_angle", "rad", "angle of the contact point from straight up (NaN: no contact)"),
+    (CONTACT_ANGLE, "rad", "angle of the contact point from straight up (NaN: no contact)"),
     ("contact_force_vertical", "N", "vertical contact force on the rotor, with friction"),
     ("contact_force_horizontal", "N", "horizontal contact force on the rotor, with friction"),
 )
