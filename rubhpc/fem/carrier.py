@@ -120,10 +120,11 @@ def assemble_carrier(
         relative = np.hstack([-mounting.shape[:, motions], np.eye(model.body.n_dof)])
         damping[met] += relative.T @ model.body.damping @ relative
         stiffness[met] += relative.T @ model.body.stiffness @ relative
-        slopes.append(None)
+        slope = None
         if model.squared_slope is not None:
-            slopes[-1] = np.zeros_like(mass)
-            slopes[-1][met] = relative.T @ model.squared_slope @ relative
+            slope = np.zeros_like(mass)
+            slope[met] = relative.T @ model.squared_slope @ relative
+        slopes.append(slope)
         kept = [*motions, *range(3, 3 + model.body.n_dof)]
         mass[met] += mounting.mass[np.ix_(kept, kept)]
     body = Body(
@@ -134,25 +135,12 @@ def assemble_carrier(
         degrees=tuple(degrees),
     )
     numbers = tuple(number for number, _, _ in stators)
-<<<<<<< HEAD
     placed = []
-    for of, (_, _, model) in zip(rows, stators, strict=True):
-        tip = (of[model.axial], of[model.lateral]) if of else (body.index(1, "v"), body.index(1, "w"))
+    for of, slope, (_, _, model) in zip(rows, slopes, stators, strict=True):
+        axial, lateral = (of[model.axial], of[model.lateral]) if of else (body.index(1, m) for m in "vw")
         turn = body.index(1, "thx") if model.is_bore else -1
-        placed.append(replace(model, body=body, alone=model, axial=tip[0], lateral=tip[1], torsion=turn))
-=======
-    placed = [
-        replace(
-            model,
-            body=body,
-            alone=model,
-            axial=of[model.axial],
-            lateral=of[model.lateral],
-            squared_slope=slope,
-        )
-        for of, slope, (_, _, model) in zip(rows, slopes, stators, strict=True)
-    ]
->>>>>>> main
+        alone = replace(model, body=body, alone=model, squared_slope=slope)
+        placed.append(replace(alone, axial=axial, lateral=lateral, torsion=turn))
     return CarrierModel(name=carrier.name, body=body, stators=numbers), placed
 
 

@@ -7,7 +7,6 @@ J. Mech. Eng. Sci. 10 (1968) 1-12). Steady rubs are its solutions with the frequ
 those without a free motion.
 """
 
-import cmath
 import math
 from dataclasses import replace
 
@@ -15,10 +14,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, minimize_scalar
 
-from rubhpc import Bore, Carrier, LumpedStator, Rig, Unbalance, assemble, branch, read_rig, simulate
+from rubhpc import Bore, Rig, Unbalance, assemble, branch, read_rig, simulate
 from rubhpc.integrate.record import State
-from rubhpc.rig.normal_law import NormalLaw
-from rubhpc.rig.reading import with_keys
 from rubhpc.schema import RUB_KIND
 
 PACKAGED = read_rig("mokhtar2017")
