@@ -39,6 +39,7 @@ CLOSE = 1e-4  # steps before a grazing at which its point may lie
 BESIDE = 1e-3, 1e-2, 0.1  # shares of a step from a grazing, at which the motion with more contacts is sought
 MISSED = 1e-4  # of a step, or of a gap, that may be left where it is taken to vanish
 MEETING, NEIGHBOURS = 0.5, 2.0  # of a step, within which the motions on both sides of a grazing lie
+SLOW = 1e-9  # of a whirl in the gap, speed of approach of a motion along the wall of a bore
 OUTWARD = 1.001  # times a motion in a bore: surely pressed against it
 WITHIN_REACH = 3.0  # steps, in which a distance to grazing would vanish
 
@@ -80,17 +81,22 @@ def passed(
 def touches(point: Point) -> Counter[int]:
     """Touches of each pair in a period; one of a bore that it fills."""
     found = Counter(pair for _, touching in point.sequence for pair in touching)
-    return found | Counter(filled(point))
+    found.update({i: 1 - found[i] for i in filled(point)})
+    return found
 
 
 def filled(point: Point) -> list[int]:
-    """Bores that a motion touches all around: it never leaves their wall."""
+    """Bores that a motion touches all around: it never leaves their wall, or comes back without a speed."""
     bores = [i for i, stator in enumerate(point.case.setup.model.stators) if stator.is_bore]
     if not bores:
         return []
     is_closed = np.array([states_of(code, point.case.q) != OPEN for code, _ in point.sequence])
     leaves = np.any(is_closed[:-1] & ~is_closed[1:], axis=0)
-    return [i for i in bores if is_closed[-1, i] and not leaves[i]]
+    speed = np.zeros(point.case.q)
+    for piece in point.pieces:
+        speed[piece.touching] = np.maximum(speed[piece.touching], piece.approach)
+    slow = SLOW * abs(point.case.setup.spin) * point.case.bodies.clearance
+    return [i for i in bores if is_closed[:, i].any() and (not leaves[i] or speed[i] < slow[i])]
 
 
 def closed_around(point: Point) -> list[Point]:
