@@ -113,6 +113,8 @@ class Body:
         Which degree each row is. Rotor: "u", "v", "w", "thx", "thy", "thz"; stator: "axial"
         (positive outward, compressed), "lateral" (positive with the rim under positive spin), "rotation".
         User-supplied matrices may have others.
+    softness : float, 1/s2
+        Of a rotor that nothing holds laterally but bores: K has that much of M, in place of zero.
     """
 
     mass: NDArray[np.float64]
@@ -121,6 +123,7 @@ class Body:
     stiffness: NDArray[np.float64]
     degrees: tuple[tuple[int, str], ...]
     by_speed: SpeedDependence | None = None
+    softness: float = 0.0
 
     def at(self, spin: float) -> Body:
         """Return the body at a spin, rad/s: itself, where nothing depends on the speed.

@@ -48,6 +48,7 @@ from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.periodic_motions.proof import Solver
 from rubhpc.integrate.periodic_motions.solved_motion import SolvedMotion, solved_motions
 from rubhpc.integrate.record import Record, State
+from rubhpc.integrate.releases import Through, record_through
 from rubhpc.integrate.scheme import Scheme
 from rubhpc.integrate.start import fit_to_gaps, start_of, with_overlap
 from rubhpc.integrate.tangent_motion import TangentMotion
@@ -129,8 +130,8 @@ def run_case(
     else:
         state = start_of(initial or Initial(), setup, clearance)
 
-    def starter(scheme: Scheme) -> Callable[[State], March]:
-        def start(state: State) -> March:
+    def starter(scheme: Scheme) -> Callable[..., March]:
+        def start(state: State, setup: Setup = setup) -> March:
             def look() -> None:
                 assert check is not None
                 revolution = march.sample / setup.samples_per_revolution
@@ -204,7 +205,7 @@ def compile_kernels(
 
 
 def _integrate(
-    start: Callable[[State], March],
+    start: Callable[..., March],
     initial: State,
     setup: Setup,
     clearance: float,
@@ -229,6 +230,7 @@ def _integrate(
         reason, n_transient = pass_transient(march, recording)
     marched: Marched | None = None
     trail: Trail | None = None
+    through: Through | None = None
     n_step_before, n_left_before = n_step, march.n_left
     if reason is not None:  # the record shows the way to divergence
         n_step, n_left = n_step + march.n_step, march.n_left
@@ -243,13 +245,21 @@ def _integrate(
         motion = motion if marched is not None else None
     if marched is None:
         trail = trail_of(march, recording)
-        marched = march_record(march, setup, recording.revolutions)
+        if isinstance(setup, ModalSetup) and setup.release is not None:
+            through = record_through(march, setup, recording.revolutions, start)
+            marched, march, n_step = through.marched, through.march, n_step + through.n_step
+        else:
+            marched = march_record(march, setup, recording.revolutions)
         reason = marched.reason
     n_step, n_left = n_step + march.n_step, n_left + march.n_left
     samples, accumulator, final = marched.samples, marched.accumulator, marched.final
-    add_sag(samples, accumulator, setup.model)
+    ended, n_before = setup, 0
+    if through is None:
+        add_sag(samples, accumulator, setup.model)
+    else:
+        ended, n_before = through.setup, through.n_sample
     if reason is not None:
-        n_kept = samples_within(samples, march.sample, setup.displacement_limit)
+        n_kept = samples_within(samples, n_before + march.sample, setup.displacement_limit)
         revolution = n_transient + min(n_kept // per_revolution + 1, recording.revolutions)
         record = diverged_record(
             f"{reason} in revolution {revolution}",
@@ -264,7 +274,7 @@ def _integrate(
         signals = by_name(samples.whole, setup.model)
         turn = 2.0 * math.pi / abs(setup.spin)
         judge = (
-            judge_of(march, start, setup, clearance, friction, recording, final, trail)
+            judge_of(march, partial(start, setup=ended), ended, clearance, friction, recording, final, trail)
             if motion is None
             else motion.judge
         )

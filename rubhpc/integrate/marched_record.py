@@ -27,7 +27,10 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-_SUMMED = ("n_contact", "contact_time", "impulse", "stick_time", "friction_work", "energy", "reversals")
+_SUMMED = (
+    *("n_contact", "contact_time", "impulse", "stick_time", "friction_work", "energy", "reversals"),
+    "turned",
+)
 _LARGEST = ("highest", "peak_force", "peak_lateral", "pivots", "residual")
 _EXTREMA = dict.fromkeys(_LARGEST, np.maximum) | dict.fromkeys(("lowest", "least_slip"), np.minimum)
 

@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -57,6 +57,13 @@ LONGEST_TURN = FINEST_TICK * 2**46  # s, 3.7 hours: 64 bits count the ticks of a
 FEWEST_STEPS = 16  # per revolution, at least
 
 
+class Release(NamedTuple):
+    """What goes on where bearings let go of the shaft."""
+
+    after: int  # revolutions of the record
+    setup: ModalSetup
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ModalSetup:
     """Set-up that the cases of one rig and speed share; contact modes are solved when first met."""
@@ -72,6 +79,7 @@ class ModalSetup:
     law: Law = MULTIPLIER
     accuracy: float = 1e-3  # relative, of the modes kept, and of loads where gaps are curved
     free_spin: FreeSpin | None = None  # of a driven rotor
+    release: Release | None = None
     is_measured: bool = True  # False: tables have no outputs and energies
     _libraries: dict[tuple[Kind, float], ModeLibrary] = field(default_factory=dict)
     _open_tables: dict[float, ModeTables] = field(default_factory=dict)

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 NODES_HARD, NODES_SPRING = 4, 5
 LONGEST_PART = 64  # longest step: a revolution over this
 SHORTEST_LEVEL = 6  # ticks of the shortest step, as a power of two
+QUIET = 3e-4  # m/s2, of a rotor that bores catch, by the rounding of its displacement in the shortest step
 MOST_SLOTS = 16
 RESTING = 1e-9  # of the largest exponent: smaller sums of two exponents count as zero
 ENOUGH = 0.3  # of the accuracy: share of the foreshortening that may be missed
@@ -251,6 +252,9 @@ class FlightModes:
         turn = 2.0 * math.pi / abs(setup.spin)
         longest = math.floor(math.log2(turn / LONGEST_PART / setup.tick))
         first = max(SHORTEST_LEVEL, longest - MOST_SLOTS + 1)
+        if setup.model.rotor.softness:  # it rests metres away: shorter steps see the rounding of that
+            least = math.sqrt(np.finfo(float).eps * float(np.abs(setup.model.sag).max()) / QUIET)
+            first = min(max(first, math.ceil(math.log2(least / setup.tick))), longest)
         k, n_y, n_x = longest - first + 1, (2 * s - 1) * n_row, self.motion.shape[1]
         return Tables(
             first_level=first,

@@ -101,8 +101,10 @@ def at_standstill(model: Model) -> Standstill:
         else:
             square, shape = eigh(symmetric[pick], mass[pick])
         if square[0] <= FREE * square[-1]:
-            free = find_rigid_body_mode(model) or "here one is free to move or to turn"
-            raise InputError(unheld_message(free))
+            free = find_rigid_body_mode(model)
+            if free or not model.rotor.softness:
+                raise InputError(unheld_message(free or "here one is free to move or to turn"))
+            square = np.maximum(square, model.rotor.softness)  # which rounding hides
         mode = np.zeros((mass.shape[0], rows.size))
         mode[rows] = shape
         n_seen = is_seen[rows].sum() + looked_at[rows].any(axis=0).sum()
