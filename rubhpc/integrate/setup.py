@@ -195,14 +195,14 @@ def prepare(
             limit += float(np.abs(model.sag).max())
         if isinstance(rig.rotor, Rotor) and rig.rotor.let_go_at(speed) < math.inf:
             after = replace(rig, rotor=rig.rotor.let_go(speed))
-            placed = {"stators": bare.stators, "carriers": bare.carriers}  # where they are set without it
+            alone = assemble(after)  # stators stay where they are set about the shaft before
             caught = prepare(
                 after,
                 speed,
                 contact=contact,
                 integrator=integrator,
                 samples_per_revolution=samples_per_revolution,
-                model=replace(assemble(after), **placed),
+                model=replace(alone, stators=bare.stators, carriers=bare.carriers),
                 probes=probes,
                 drive=drive,
                 is_measured=is_measured,
