@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from rubhpc.rig.reading import read_rig
     from rubhpc.rig.rig import Rig
     from rubhpc.rig.rotors import Load, Unbalance
-    from rubhpc.rig.stators import LumpedStator, MatrixStator, Stator
+    from rubhpc.rig.stators import Bore, LumpedStator, MatrixStator, Stator
     from rubhpc.run_up import run_up
     from rubhpc.running.driver import run
     from rubhpc.simulate import simulate
@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from rubhpc.study.study import Study, read_study
 
 __all__ = [
+    "Bore",
     "Branch",
     "Carrier",
     "InputError",
@@ -77,6 +78,7 @@ __all__ = [
 
 # Module of each name; imported at first use, so that `import rubhpc` is fast.
 _HOMES = {
+    "Bore": "rubhpc.rig.stators:Bore",
     "Branch": "rubhpc.integrate.branches.branch:Branch",
     "Carrier": "rubhpc.rig.carriers:Carrier",
     "InputError": "rubhpc.errors:InputError",

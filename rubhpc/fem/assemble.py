@@ -101,7 +101,11 @@ def _set_about_the_shaft(
     except InputError as error:
         raise InputError(f"[rotor] clearance_from: {error}") from None
     sag, _ = at_rest_under(turning, load, spin)
-    return [replace(stator, centre=sag_at(turning, sag, stator.node)) for stator in stators]
+    placed = []
+    for stator in stators:
+        (v, w), (y, z) = sag_at(turning, sag, stator.node), stator.centre
+        placed.append(replace(stator, centre=(v + y, w + z)))
+    return placed
 
 
 def _on_carriers(rig: Rig, stators: list[StatorModel]) -> tuple[list[StatorModel], list[CarrierModel]]:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.rig.bearing_table import BearingTable
+    from rubhpc.rig.normal_law import NormalLaw
     from rubhpc.rig.probes import Probe
 
 
@@ -198,8 +199,12 @@ class StatorModel:
     lateral: int  # row of the tip's lateral displacement; -1 without lateral freedom
     # (n_dof, n_dof), 1/m: the tip draws back by half the form of the displacements; None: not counted
     squared_slope: NDArray[np.float64] | None = None
-    centre: tuple[float, float] = (0.0, 0.0)  # m, about which it is set: v and w of the shaft there
+    centre: tuple[float, float] = (0.0, 0.0)  # m, about which it is set, up and horizontally
     strength: float = math.inf  # N, contact force that it bears
+    is_bore: bool = False  # a hole around the rotor, which moves up ("axial") and horizontally ("lateral")
+    friction_factor: float = 1.0  # friction over that of the case
+    law: NormalLaw | None = None  # in place of that of the case
+    torsion: int = -1  # row of its rotation about the shaft's axis, of a bore on a carrier that turns
     alone: StatorModel | None = None  # on a carrier: while that is held; `body` is all that stands on it
 
     @cached_property
