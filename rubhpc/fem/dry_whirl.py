@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,14 +12,16 @@ import xarray as xr
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble, model_at
 from rubhpc.fem.linear_design import checked_range
+from rubhpc.fem.modes import KINDS, undamped_modes
 from rubhpc.fem.receptance import turning_receptances, twist_receptance
 from rubhpc.fem.statics import sag_at
-from rubhpc.fem.whirl_balance import ROLLING, SLIPPING, Balance, Whirl
+from rubhpc.fem.whirl_balance import ROLLING, SLIPPING, Balance
 from rubhpc.rig.normal_law import NormalLaw
 from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from typing import Any
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -28,20 +30,22 @@ if TYPE_CHECKING:
     from rubhpc.rig.rig import Rig
 
     Floats = NDArray[np.float64]
+    Row = dict[str, Any]
 
 N_SPEED = 13  # speeds by default
+N_MODE = 6  # pairs of lateral modes up to which whirl frequencies are searched by default
 HARD = NormalLaw()
+NAMES = {SLIPPING: "whip", ROLLING: "rolling whirl"}
+MOST_SPEEDS, MOST_SETTINGS = 13, 3  # of a study with more, those that are shown
 _OFFSET = 1e-6  # of the clearance: distance of the shaft from the centre of a bore that counts
 _COLUMNS = {  # of a whirl: unit and name
     "speed": ("rad s-1", "Spin speed"),
     "clearance": ("m", "Radial clearance"),
-    "friction": ("1", "Friction of the case"),
+    "friction": ("1", "Coefficient of friction"),
     "frequency": ("rad s-1", "Whirl frequency"),
-    "needed_friction": ("1", "Friction of the case that the whirl needs"),
     "orbit": ("m", "Radius of the orbit of the rim's centre"),
     "hole_orbit": ("m", "Radius of the orbit of the hole's centre"),
     "normal_force": ("N", "Normal force"),
-    "growth_rate": ("s-1", "Largest growth rate of small changes"),
 }
 
 
@@ -49,8 +53,8 @@ _COLUMNS = {  # of a whirl: unit and name
 def dry_whirl(
     rig: Rig,
     speeds: Sequence[float] | Floats | None = None,
-    clearances: ArrayLike = (),
-    frictions: Sequence[float] = (),
+    clearances: Sequence[float] | Floats = (),
+    frictions: Sequence[float] | Floats = (),
     *,
     law: NormalLaw = HARD,
     most_frequency: float | None = None,
@@ -63,31 +67,33 @@ def dry_whirl(
     speeds : (n_speed,), optional
         Spin, rad/s; by default 13 from 0 to six times the first lateral frequency, or over the tables of
         bearings.
-    clearances : (n_clearance,) or (n_speed, n_clearance)
-        Radial clearance of the case, m.
-    frictions : sequence of float
-        Coefficients of friction of the case, for which whirls are listed; may be empty.
+    clearances : (n_clearance,)
+        Radial clearances of the case, m.
+    frictions : (n_friction,), optional
+        Coefficients of friction of the case for which whirls are listed.
     law : NormalLaw
         Contact law of the bores that have none of their own.
     most_frequency : float, optional
-        Highest whirl frequency of interest, rad/s; by default there is no limit.
+        Highest whirl frequency searched, rad/s; by default the natural frequency at standstill of the seventh
+        pair of lateral modes of the rotor, and no limit where it has fewer. `math.inf` is no limit.
 
     Returns
     -------
     xarray.Dataset
-        Over (stator, speed, setting), with the coordinates `node` of a stator, from which the numbers of bores
-        are taken, and `clearance` (m) of a setting: `least_friction`, the coefficient below which no whirl
-        exists, inf where none exists at all; `least_frequency` (rad/s) and `least_kind` ("slipping",
-        "rolling" or "") of the whirl just above it; `is_approximate`, where the rotor or the hole is
-        anisotropic, or the shaft does not rest in the centre of the bore.
+        Over (stator, speed, clearance), with the coordinate `node`: `least_friction` of the case, below which
+        no whirl exists, infinite where none exists at all; and `is_approximate`, where rotor or hole are
+        anisotropic or the shaft does not rest in the centre of the bore.
 
-        Over whirl, each at one of the frictions: `whirl_stator`, `whirl_speed` (rad/s), `whirl_clearance` (m),
-        `whirl_friction`, `whirl_frequency` (rad/s, positive in the sense of positive spin), `whirl_kind`,
-        `whirl_needed_friction`, `whirl_orbit`, `whirl_hole_orbit` (m), `whirl_normal_force` (N),
-        `whirl_growth_rate` (1/s) and `is_stable`.
+        Over threshold: the whirl of least friction in each range of frequencies in which one can exist. Over
+        whirl: all whirls at each of the frictions. Both have columns `threshold_` and `whirl_`: `stator`,
+        `speed` (rad/s), `clearance` (m), `friction` (of the case), `frequency` (rad/s, positive in the sense
+        of positive spin), `kind` ("slipping" or "rolling"), `orbit` and `hole_orbit` (m, radii of the orbits
+        of both centres), `normal_force` (N); `whirl_growth_rate` (1/s), negative where it is stable.
 
-        Over point, at the first speed and clearance: `curve_stator`, `curve_frequency` (rad/s) and
-        `curve_friction`, which a slipping whirl of that frequency needs.
+        Over point, at the highest speed and the first clearance: `curve_stator`, `curve_frequency` (rad/s)
+        and `curve_friction` that a slipping whirl of this frequency needs.
+
+        Attributes: `rig`, its name; `frictions`; `most_frequency` (rad/s).
 
     Raises
     ------
@@ -98,25 +104,25 @@ def dry_whirl(
     bores = [i for i, stator in enumerate(model.stators) if stator.is_bore]
     if not bores:
         raise InputError(f'rig {rig.name}: has no bore; add a [[stator]] with kind = "bore"')
-    spins = np.asarray(speeds if speeds is not None else np.linspace(*checked_range(model, None), N_SPEED))
+    spins = np.linspace(*checked_range(model, None), N_SPEED) if speeds is None else np.asarray(speeds, float)
     gaps = np.asarray(clearances, dtype=float)
-    gaps = np.broadcast_to(np.atleast_1d(gaps), (spins.size, np.atleast_1d(gaps).shape[-1]))
     if not gaps.size:
         raise InputError("clearance: missing; give at least one")
-    shape = (len(bores), *gaps.shape)
-    friction, frequency, kind = np.full(shape, math.inf), np.full(shape, math.nan), np.full(shape, "", "U8")
-    is_approximate = np.zeros(shape, dtype=bool)
-    rows: list[tuple[int, float, float, float, Whirl, float]] = []
-    curve: list[Floats] = []
+    top = _highest(model) if most_frequency is None else most_frequency
+    shape = (len(bores), spins.size, gaps.size)
+    least, is_approximate = np.full(shape, math.inf), np.zeros(shape, dtype=bool)
+    thresholds: list[Row] = []
+    whirls: list[Row] = []
+    curve = []
     for j, spin in enumerate(spins.tolist()):
         turning = model_at(model, spin)
-        for i, (number, parts) in enumerate(zip(bores, _receptances(turning, bores, spin), strict=True)):
-            stator = model.stators[number]
-            factor = stator.friction_factor
-            for k, gap in enumerate(gaps[j].tolist()):
+        for i, parts in enumerate(_receptances(turning, bores, spin)):
+            stator = model.stators[bores[i]]
+            factor = stator.friction_factor or math.nan  # of a bore without friction nothing is left
+            for k, gap in enumerate(gaps.tolist()):
                 radial = gap + stator.clearance_offset
                 if not 0.0 < radial < math.inf:
-                    problem = f"stator {number + 1} has a radial clearance of {radial:g} m"
+                    problem = f"stator {bores[i] + 1} has a radial clearance of {radial:g} m"
                     raise InputError(f"clearance: {problem}; give one above 0")
                 balance = Balance(
                     *parts,
@@ -124,54 +130,138 @@ def dry_whirl(
                     radius=stator.radius,
                     clearance=radial,
                     law=stator.law or law,
-                    most_frequency=most_frequency,
+                    most_frequency=top,
                 )
-                offset = _offset(turning, stator)
-                is_approximate[i, j, k] = parts[0].is_mean or parts[1].is_mean or offset > _OFFSET * radial
-                least = balance.least()
-                if least is not None:
-                    friction[i, j, k] = least.friction / factor if factor else math.inf
-                    frequency[i, j, k], kind[i, j, k] = least.frequency, least.kind
+                is_approximate[i, j, k] = (
+                    parts[0].is_mean or parts[1].is_mean or _offset(turning, stator) > _OFFSET * radial
+                )
+                of = {"stator": bores[i] + 1, "speed": spin, "clearance": gap}
+                for whirl in balance.thresholds():
+                    thresholds.append(of | asdict(whirl) | {"friction": whirl.friction / factor})
+                    least[i, j, k] = np.fmin(least[i, j, k], whirl.friction / factor)
                 for mu in frictions:
-                    for whirl in balance.whirls(mu * factor):
-                        rows.append((number + 1, spin, gap, mu, whirl, balance.growth_rate(whirl)))
-                if j == k == 0:
+                    whirls += [
+                        of | asdict(whirl) | {"friction": mu, "growth_rate": balance.growth_rate(whirl)}
+                        for whirl in balance.whirls(mu * stator.friction_factor)
+                    ]
+                if k == 0 and j == int(np.abs(spins).argmax()):
                     w, needed = balance.curve()
-                    curve.append(np.stack([np.full(w.size, number + 1.0), w, needed / (factor or math.nan)]))
-    along = ("stator", "speed", "setting")
+                    curve.append([np.full(w.size, bores[i] + 1.0), w, needed / factor])
+    along = ("stator", "speed", "clearance")
     found = xr.Dataset(
         {
-            "least_friction": (along, friction, _unit("1", "Least friction of a dry whirl")),
-            "least_frequency": (along, frequency, _unit("rad s-1", "Frequency of the whirl of least friction")),
-            "least_kind": (along, kind),
+            "least_friction": (along, least, _unit("1", "Least friction of a dry whirl")),
             "is_approximate": (along, is_approximate),
         },
         coords={
-            "stator": ("stator", np.array(bores) + 1),
+            "stator": np.array(bores) + 1,
             "node": ("stator", [model.stators[i].node for i in bores], {"long_name": "Node"}),
-            "speed": ("speed", spins.astype(float), _unit("rad s-1", "Spin speed")),
-            "clearance": (("speed", "setting"), gaps, _unit("m", "Radial clearance")),
+            "speed": ("speed", spins, _unit("rad s-1", "Spin speed")),
+            "clearance": ("clearance", gaps, _unit("m", "Radial clearance")),
         },
-        attrs={"rig": rig.name, "frictions": list(frictions)},
+        attrs={"rig": rig.name, "frictions": [float(mu) for mu in frictions], "most_frequency": top},
     )
-    if most_frequency is not None:
-        found.attrs["most_frequency"] = most_frequency
-    return found.merge(_listed(rows)).merge(_drawn(np.hstack(curve)))
+    _add_columns(found, "threshold", thresholds)
+    _add_columns(found, "whirl", whirls)
+    found["whirl_growth_rate"] = "whirl", [row["growth_rate"] for row in whirls], _unit("s-1", "Growth rate")
+    number, w, needed = np.concatenate(curve, axis=1)
+    found["curve_stator"] = "point", number.astype(int)
+    found["curve_frequency"] = "point", w, _unit("rad s-1", "Whirl frequency")
+    found["curve_friction"] = "point", needed, _unit("1", "Friction that a slipping whirl needs")
+    return found
+
+
+def in_words(found: xr.Dataset) -> list[str]:
+    """Return a sentence for each bore: where dry whirl begins, and which exists at the frictions given."""
+    speeds, limit = found["speed"].values, found.attrs["most_frequency"]
+    span = f"at {_rpm(speeds[0])}" if speeds.size == 1 else f"up to {_rpm(speeds[np.abs(speeds).argmax()])}"
+    return [_sentence(found, i, span, limit) for i in range(found.sizes["stator"])]
+
+
+def _sentence(found: xr.Dataset, i: int, span: str, limit: float) -> str:
+    bore = int(found["stator"][i])
+    at = found.isel(threshold=found["threshold_stator"].values == bore)
+    below = f" of up to {_hertz(limit)}" if math.isfinite(limit) else ""
+    text = f"stator {bore}, node {int(found['node'][i])}: no dry whirl{below}"
+    needed = at["threshold_friction"].values
+    if not np.isfinite(needed).any():
+        text += f" {span}, whatever the friction"
+    else:
+        k = int(np.nanargmin(needed))
+        text += f" below a friction of {needed[k]:.3g} {span}; above it {_named(at, 'threshold', k)}"
+        size = np.abs(at["threshold_frequency"].values)
+        slow = np.flatnonzero(size < 1.1 * size.min())  # the range of the lowest frequency, at all speeds
+        first = int(slow[np.nanargmin(needed[slow])])
+        if size[first] < 0.9 * size[k]:
+            text += f", and {_named(at, 'threshold', first)} above {needed[first]:.3g}"
+    for mu in found.attrs["frictions"]:
+        is_at = (found["whirl_stator"] == bore) & (found["whirl_friction"] == mu)
+        text += f"; at {mu:g} {_listed(found.isel(whirl=np.flatnonzero(is_at)))}"
+    return text + (" (approximate)" if bool(found["is_approximate"][i].any()) else "")
+
+
+def _named(found: xr.Dataset, dim: str, k: int) -> str:
+    frequency = float(found[f"{dim}_frequency"][k])
+    is_forward = frequency * float(found[f"{dim}_speed"][k]) > 0.0
+    word = NAMES[found[f"{dim}_kind"].values[k]]
+    return f"{'forward ' * is_forward}{word} at {_hertz(abs(frequency))}"
+
+
+def _listed(found: xr.Dataset) -> str:
+    """Whirls at one bore and friction: frequencies and stability of each kind."""
+    parts = []
+    for kind, word in NAMES.items():
+        some = found.isel(whirl=np.flatnonzero(found["whirl_kind"].values == kind))
+        if not some.sizes["whirl"]:
+            continue
+        size = np.abs(some["whirl_frequency"].values)
+        ends = list(dict.fromkeys(_hertz(end) for end in (size.min(), size.max())))
+        is_stable = some["whirl_growth_rate"].values < 0.0
+        state = "stable" if is_stable.all() else "partly stable" if is_stable.any() else "unstable"
+        slowest = _rpm(np.abs(some["whirl_speed"].values).min())
+        parts.append(f"{word} at {' to '.join(ends)} ({state}) from {slowest} on")
+    return " and ".join(parts) or "none"
+
+
+def _rpm(speed: float) -> str:
+    return f"{float(f'{speed * 30.0 / math.pi:.4g}'):g} rpm"
+
+
+def _hertz(frequency: float) -> str:
+    return f"{float(f'{frequency / (2.0 * math.pi):.3g}'):g} Hz"
+
+
+def thinned(values: ArrayLike, most: int) -> Floats:
+    """Return the different numbers among values, at most some evenly spread ones, rising."""
+    single = np.unique(np.asarray(values, dtype=float))
+    single = single[np.isfinite(single)]
+    at = np.unique(np.linspace(0, single.size - 1, min(most, single.size)).round())
+    return np.array(single[at.astype(int)])
+
+
+def _highest(model: Model) -> float:
+    """Natural frequency of the first lateral mode beyond those that count by default, rad/s; or inf."""
+    rotor = replace(model.rotor.at(0.0), by_speed=None)
+    rows = rotor.rows(KINDS["lateral"])
+    block = np.ix_(rows, rows)
+    square = undamped_modes(rotor.mass[block], (rotor.stiffness + rotor.stiffness.T)[block] / 2)[0]
+    return math.sqrt(abs(square[2 * N_MODE])) if len(square) > 2 * N_MODE else math.inf
 
 
 def _receptances(
     model: Model, bores: Sequence[int], spin: float
 ) -> list[tuple[Receptance, Receptance, Receptance]]:
-    """Of each bore at a spin (rad/s): receptances of rim and hole, and path of the rim along the wall by twist."""
+    """Of each bore at a spin (rad/s): receptances of rim, hole, and path along the wall by twist."""
     rotor = replace(model.rotor, damping=model.rotor.damping + spin * model.rotor.gyroscopic)
     stators = [model.stators[i] for i in bores]
-    rims = turning_receptances(rotor, [tuple(rotor.index(s.node, d) for d in ("v", "w")) for s in stators])
+    rims = turning_receptances(rotor, [(rotor.index(s.node, "v"), rotor.index(s.node, "w")) for s in stators])
     found = []
     for stator, rim in zip(stators, rims, strict=True):
         (hole,) = turning_receptances(stator.body, [(stator.axial, stator.lateral)])
-        twist = twist_receptance(rotor, rotor.index(stator.node, "thx")).scaled(stator.radius**2)
-        wall = twist_receptance(stator.body, stator.torsion).scaled(stator.radius**2)
-        found.append((rim, hole, twist + wall))
+        # The wall is at the radius of the rim and the clearance, which is left out here.
+        twist = twist_receptance(rotor, rotor.index(stator.node, "thx"))
+        wall = twist_receptance(stator.body, stator.torsion)
+        found.append((rim, hole, (twist + wall).scaled(stator.radius**2)))
     return found
 
 
@@ -181,39 +271,12 @@ def _offset(model: Model, stator: StatorModel) -> float:
     return math.hypot(at[0] - stator.centre[0], at[1] - stator.centre[1])
 
 
-def _listed(rows: Sequence[tuple[int, float, float, float, Whirl, float]]) -> xr.Dataset:
-    """Whirls as columns over `whirl`."""
-    values = {
-        "speed": [row[1] for row in rows],
-        "clearance": [row[2] for row in rows],
-        "friction": [row[3] for row in rows],
-        "frequency": [row[4].frequency for row in rows],
-        "orbit": [row[4].orbit for row in rows],
-        "hole_orbit": [row[4].hole_orbit for row in rows],
-        "normal_force": [row[4].normal_force for row in rows],
-        "growth_rate": [row[5] for row in rows],
-    }
-    columns = {
-        f"whirl_{name}": ("whirl", np.array(values[name], dtype=float), _unit(*_COLUMNS[name])) for name in values
-    }
-    return xr.Dataset(
-        columns
-        | {
-            "whirl_stator": ("whirl", np.array([row[0] for row in rows], dtype=int)),
-            "whirl_kind": ("whirl", np.array([row[4].kind for row in rows], dtype="U8")),
-            "is_stable": ("whirl", np.array([row[5] < 0.0 for row in rows], dtype=bool)),
-        }
-    )
-
-
-def _drawn(curve: Floats) -> xr.Dataset:
-    return xr.Dataset(
-        {
-            "curve_stator": ("point", curve[0].astype(int)),
-            "curve_frequency": ("point", curve[1], _unit("rad s-1", "Whirl frequency")),
-            "curve_friction": ("point", curve[2], _unit("1", "Friction that a slipping whirl needs")),
-        }
-    )
+def _add_columns(found: xr.Dataset, dim: str, rows: Sequence[Row]) -> None:
+    """Add whirls to a dataset, as columns along a dimension."""
+    found[f"{dim}_stator"] = dim, np.array([row["stator"] for row in rows], dtype=int)
+    found[f"{dim}_kind"] = dim, np.array([row["kind"] for row in rows], dtype="U8")
+    for name, units in _COLUMNS.items():
+        found[f"{dim}_{name}"] = dim, np.array([row[name] for row in rows], dtype=float), _unit(*units)
 
 
 def _unit(units: str, name: str) -> dict[str, str]:

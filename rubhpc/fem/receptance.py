@@ -1,12 +1,12 @@
-"""Receptances for rotating forces: displacement of a point over a force on it that turns at a whirl frequency.
+"""Receptances for rotating forces: motion of a point over a force on it that turns at a whirl frequency.
 
-A force `f exp(i w t)` in the complex plane v + i w turns with the frequency w, forward where w is positive. The
-forward part of the response is `alpha(w) f exp(i w t)` with
+A force `f exp(i w t)` in the complex plane v + i w turns with the frequency w, forward where w is positive.
+The forward part of the response is `alpha(w) f exp(i w t)` with
 
     alpha(w) = 1/2 (1, i) A(i w) (1, -i)^T,   A(s) = L (M s^2 + (D + spin G) s + K)^-1 L^T,
 
-which is the whole response of an isotropic body. Of an anisotropic one it is the mean over all directions, and the
-backward part is left out. As a sum over modes, `alpha(w) = sum residue / (i w - pole)`.
+which is the whole response of an isotropic body. Of an anisotropic one it is the mean over all directions,
+and the backward part is left out. As a sum over modes, `alpha(w) = sum residue / (i w - pole)`.
 """
 
 from __future__ import annotations
@@ -33,7 +33,9 @@ _RESOLVED = 0.05  # change of a receptance over its size, within a cell of `cell
 _NARROWEST = 1e-9  # width of a cell over its frequency
 _SEEN = 1e-9  # share in a receptance at its own resonance, below which a mode is left out
 _ANISOTROPIC = 1e-7  # backward over forward response, from which a body is called anisotropic
-_SOFT = 1e-6  # frequency over the lowest one that a rigid-body mode is given: a double pole has no sum of modes
+_SOFT = (
+    1e-6  # frequency over the lowest one that a rigid-body mode is given: a double pole has no sum of modes
+)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -67,7 +69,8 @@ class Receptance:
 
     def at(self, frequency: float | Floats) -> Complex:
         """Return the receptance at whirl frequencies (rad/s), an array of their shape, m/N."""
-        return self.derivatives(frequency, 0)[0]
+        found: Complex = self.derivatives(frequency, 0)[0]
+        return found
 
     def derivatives(self, frequency: float | Floats, order: int) -> Complex:
         """Return the receptance and its derivatives with the frequency, (order + 1, ...)."""
@@ -80,10 +83,10 @@ class Receptance:
         return np.array(found)
 
     def cells(self, low: float, high: float) -> tuple[Floats, Floats]:
-        """Return intervals of frequency, their lower and upper ends (n,), that hold all w with Re alpha(w) < 0.
+        """Return intervals that hold all frequencies with Re alpha < 0: their lower and upper ends, (n,).
 
-        In each of them the receptance changes by less than 5 % of its size, by a bound that holds for every
-        sum of modes: no resonance, however narrow, lies between two of their ends unseen.
+        In each the receptance changes by less than 5 % of its size. This is a bound, from the first two
+        derivatives in the middle and the poles: no resonance, however narrow, is between the ends unseen.
         """
         size = np.abs(self.residue)
         ends = np.unique(np.clip([low, 0.0, high], low, high))
@@ -137,7 +140,8 @@ def turning_receptances(body: Body, places: Sequence[tuple[int, int]]) -> list[R
         back = Receptance(pole=pole, residue=0.5 * (FORWARD[is_free].conj() @ left[at]) * push)
         is_seen = _seen(whole)
         tried = 1.01 * np.abs(pole[is_seen])
-        is_mean = (np.abs(back.at(tried)) > _ANISOTROPIC * np.abs(whole.at(tried))).any()
+        scale = np.abs(whole.residue / pole).sum()
+        is_mean = (np.abs(back.at(tried)) > _ANISOTROPIC * scale).any()
         found.append(
             Receptance(
                 pole=pole[is_seen],
@@ -163,7 +167,9 @@ def _modal(body: Body, rows: NDArray[np.int64]) -> tuple[Complex, Complex, Compl
     part = np.flatnonzero(np.isin(body.part, body.part[rows]))
     block = np.ix_(part, part)
     here = np.searchsorted(part, rows)
-    shapes, sigma, stiffness, damping = modal_form(body.mass[block], body.damping[block], body.stiffness[block])
+    shapes, sigma, stiffness, damping = modal_form(
+        body.mass[block], body.damping[block], body.stiffness[block]
+    )
     is_free = np.diag(stiffness) == 0.0
     stiffness[is_free, is_free] = (_SOFT * sigma[~is_free].min(initial=sigma.max())) ** 2
     pole, vectors = np.linalg.eig(first_order(sigma, stiffness, damping))
@@ -177,4 +183,7 @@ def _seen(whole: Receptance) -> NDArray[np.bool_]:
     """Which modes matter at their own resonance."""
     size, pole = np.abs(whole.residue), whole.pole
     there = np.abs(whole.at(pole.imag + EPS * np.abs(pole)))
-    return (size > _SEEN * there * np.abs(pole.real)) & (size > EPS * size.max(initial=0.0))
+    found: NDArray[np.bool_] = (size > _SEEN * there * np.abs(pole.real)) & (
+        size > EPS * size.max(initial=0.0)
+    )
+    return found

@@ -1,8 +1,8 @@
-"""Steady dry whirl of a rotor in a round bore: where forces balance without unbalance, and whether it is stable.
+"""Steady dry whirl of a rotor in a round bore: where forces balance without unbalance, and its stability.
 
-H. F. Black, J. Mech. Eng. Sci. 10 (1968) 1-12, with the sign of the slip; docs/theory/dry_whirl.md. In steady
-whirl the centres of rim and hole keep the distance rho and turn with the whirl frequency w. The contact force on
-the rotor is `-(N + i T) n`, so that with the receptance gamma of rim and hole together
+H. F. Black, J. Mech. Eng. Sci. 10 (1968) 1-12, with the sign of the slip; docs/theory/dry_whirl.md. The
+centres of rim and hole keep the distance rho and turn with the whirl frequency w. The contact force on the
+rotor is `-(N + i T) n`, so that with the receptance gamma of rim and hole together
 
     rho = -gamma(w) (N + i T),   N = -rho Re(1 / gamma),   T = -rho Im(1 / gamma).
 
@@ -79,8 +79,8 @@ class Balance:
         Of the rim, and radial, m.
     law : NormalLaw
         Of the contact.
-    most_frequency : float, optional
-        Highest whirl frequency, rad/s; by default there is none.
+    most_frequency : float
+        Highest whirl frequency searched, rad/s.
     """
 
     def __init__(
@@ -93,18 +93,16 @@ class Balance:
         radius: float,
         clearance: float,
         law: NormalLaw,
-        most_frequency: float | None = None,
+        most_frequency: float = math.inf,
     ) -> None:
         self._rotor, self._hole, self._twist, self._law = rotor, hole, twist, law
         self._receptance = rotor + hole
         self._clearance, self._rim_speed = clearance, radius * spin
-        top = most_frequency
-        if top is None:
-            fastest = float(np.abs(self._receptance.pole).max(initial=0.0))
-            top = max(_BEYOND * fastest, 1.01 * abs(self._rim_speed) / clearance)
+        fastest = float(np.abs(self._receptance.pole).max(initial=0.0))
+        top = min(most_frequency, max(_BEYOND * fastest, 1.01 * abs(self._rim_speed) / clearance))
         self._set_cells(*self._receptance.cells(-top, top))
         self._rolling = [w for w in self._zeros(self._slip) if self._presses(w)]
-        # The least friction is where it is stationary or zero, where slip ends, or at the last that a spring holds.
+        # The least friction is where it is stationary or zero, where slip or the range ends, or at the limit.
         points = [*self._turns, *self._zeros(lambda _, value: value.imag), -top, top]
         self._lowest = [w for w in points if self._presses(w) and self._balances(w, self._slip_at(w))]
         if law.kind == "penalty":
@@ -115,22 +113,45 @@ class Balance:
         """Return all steady whirls at a coefficient of friction, by rising frequency."""
         found = [self._whirl(w, ROLLING) for w in self._rolling if abs(self._ratio(w)) <= friction]
         for sign in (1.0, -1.0):
-            for w in self._zeros(lambda _, value, sign=sign: value.imag + sign * friction * value.real):
+            slope = sign * friction
+
+            def excess(_: Any, value: Any, slope: float = slope) -> Any:
+                return value.imag + slope * value.real
+
+            for w in self._zeros(excess):
                 if self._presses(w) and np.sign(self._slip_at(w)) == sign:
                     found.append(self._whirl(w, SLIPPING))
         return sorted(found, key=lambda whirl: whirl.frequency)
 
-    def least(self) -> Whirl | None:
-        """Return the whirl that needs the least friction; None where no friction makes one possible."""
+    def thresholds(self) -> list[Whirl]:
+        """Return the whirl that needs the least friction in each range of frequencies, by rising frequency.
+
+        In each range the hole presses on the rim, and no whirl is possible with less friction. The radius is
+        infinite at the limit of what a penalty's spring holds.
+        """
         found = [self._whirl(w, ROLLING) for w in self._rolling]
         found += [self._whirl(w, SLIPPING) for w in self._lowest]
-        return min(found, key=lambda whirl: whirl.friction, default=None)
+        bounds = np.sort(self._zeros(lambda _, value: value.real))
+        least: dict[int, Whirl] = {}
+        for whirl in sorted(found, key=lambda whirl: -whirl.friction):
+            least[int(np.searchsorted(bounds, whirl.frequency))] = whirl
+        return sorted(least.values(), key=lambda whirl: whirl.frequency)
+
+    def curve(self) -> tuple[Floats, Floats]:
+        """Return frequencies, rad/s, and the friction that slipping whirl needs, NaN without, (n,) each."""
+        w = np.unique(np.concatenate([self._lower, self._upper]))
+        value = self._receptance.at(w)
+        ratio = -value.imag / value.real
+        exists = (
+            (value.real < 0.0) & (self._inverse_radius(value) > 0.0) & (ratio * self._slip(w, value) >= 0.0)
+        )
+        return w, np.where(exists, np.abs(ratio), np.nan)
 
     def growth_rate(self, whirl: Whirl) -> float:
         """Return the largest growth rate of small changes of a whirl, 1/s: negative where it is stable.
 
-        A whirl is a relative equilibrium in the frame that turns with it. The change of its phase, which
-        neither grows nor decays, does not count; nor do rates below ten times the whirl frequency.
+        A whirl is a relative equilibrium in the frame that turns with it. The change of its phase, which does
+        not decay, is left out. Rates below -10 times the whirl frequency are not resolved.
         """
         w, rho, N = whirl.frequency, whirl.radius, whirl.normal_force
         T = -rho * (1.0 / complex(self._receptance.at(w))).imag
@@ -141,12 +162,14 @@ class Balance:
         is_lateral = np.arange(len(pole)) < n
 
         def acts(force: complex, drag: float = 0.0) -> Floats:
-            """Effect on the modes of a change of N + i T, in the frame, and of the friction on the twist."""
+            """Effect of a change of N + i T on the modes, and of `drag` on those of the twist."""
             effect = np.concatenate([force * self._receptance.residue, drag * twist.residue])
             return np.concatenate([effect.real, effect.imag])
 
         # States: real and imaginary parts of the modes, of the displacement x + i y and of the twist.
-        state = np.block([[np.diag(pole.real), -np.diag(pole.imag)], [np.diag(pole.imag), np.diag(pole.real)]])
+        state = np.block(
+            [[np.diag(pole.real), -np.diag(pole.imag)], [np.diag(pole.imag), np.diag(pole.real)]]
+        )
         x, y, turn = np.zeros((3, 2 * len(pole)))
         x[: len(pole)], y[len(pole) :], turn[: len(pole)] = -1.0 * is_lateral, -1.0 * is_lateral, ~is_lateral
         state += np.outer(acts(1j * (N + 1j * T) / rho), y)  # the normal turns by y / rho
@@ -228,11 +251,13 @@ class Balance:
         return self._rim_speed * self._inverse_radius(value) + w
 
     def _inverse_radius(self, value: Any) -> Any:
-        """Return 1 / rho by the contact law for a receptance, 1/m; negative beyond what a penalty's spring holds."""
+        """Return 1 / rho by the contact law, 1/m; negative where the spring of a penalty gives way."""
         if self._law.kind == "lagrange":
             return np.full(np.shape(value), 1.0 / self._clearance)
         assert self._law.stiffness is not None
-        ratio = np.maximum(-(1.0 / np.asarray(value)).real, 0.0) / self._law.stiffness  # N / rho over stiffness
+        ratio = (
+            np.maximum(-(1.0 / np.asarray(value)).real, 0.0) / self._law.stiffness
+        )  # N / rho over stiffness
         if self._law.kind == "penalty":
             return (1.0 - ratio) / self._clearance
         # Hertz: y^3 = ratio (c + y^2) of the root y of the approach, by Newton's method from above.
