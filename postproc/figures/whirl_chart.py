@@ -28,9 +28,9 @@ _WIDE = 50.0  # ratio of frequencies from which their axis is logarithmic
 def draw_whirl(found: xr.Dataset) -> Drawing:
     """Return the chart of `rubhpc.dry_whirl`: a row of two panels for each bore.
 
-    Over the speed, or of a single one over the clearance: the least friction that whirl needs, with dots where
-    it begins in other ranges of frequency; and the frequencies of whirls at the frictions given, full where
-    stable, or else those at which whirl begins. Of a single speed and clearance: the friction over the
+    Over the speed, or of a single one over the clearance: the least friction that whirl needs, with dots
+    where it begins in other ranges of frequency; and the frequencies of whirls at the frictions given, full
+    where stable, or else those at which whirl begins. Of a single speed and clearance: the friction over the
     frequency.
 
     Parameters

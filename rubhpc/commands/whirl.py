@@ -94,7 +94,7 @@ def whirl(
         click.echo(json.dumps({"answer": answer} | _plain(found)))
     else:
         for line in answer:
-            click.echo(f"{line[:1].upper()}{line[1:]}.")
+            click.echo(line)
         _print_table(found)
     if data:
         click.echo(f"wrote {write_data(found, data)}", err=True)

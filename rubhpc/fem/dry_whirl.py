@@ -182,7 +182,7 @@ def _sentence(found: xr.Dataset, i: int, span: str, limit: float) -> str:
     bore = int(found["stator"][i])
     at = found.isel(threshold=found["threshold_stator"].values == bore)
     below = f" of up to {_hertz(limit)}" if math.isfinite(limit) else ""
-    text = f"stator {bore}, node {int(found['node'][i])}: no dry whirl{below}"
+    text = f"Stator {bore}, node {int(found['node'][i])}: no dry whirl{below}"
     needed = at["threshold_friction"].values
     if not np.isfinite(needed).any():
         text += f" {span}, whatever the friction"
@@ -197,7 +197,7 @@ def _sentence(found: xr.Dataset, i: int, span: str, limit: float) -> str:
     for mu in found.attrs["frictions"]:
         is_at = (found["whirl_stator"] == bore) & (found["whirl_friction"] == mu)
         text += f"; at {mu:g} {_listed(found.isel(whirl=np.flatnonzero(is_at)))}"
-    return text + (" (approximate)" if bool(found["is_approximate"][i].any()) else "")
+    return text + (" (approximate)." if bool(found["is_approximate"][i].any()) else ".")
 
 
 def _named(found: xr.Dataset, dim: str, k: int) -> str:

@@ -1,0 +1,148 @@
+"""The command `whirl`: what it answers in words, as JSON and as a chart, for a rig and for a study."""
+
+import json
+import math
+
+import pytest
+from click.testing import CliRunner
+
+from rubhpc.commands.whirl import whirl
+from rubhpc.errors import InputError
+
+RIG = """
+name = "pump"
+[[rotor.shaft]]
+length = "0.8 m"
+outer_diameter = "30 mm"
+elements = 4
+youngs_modulus = "210 GPa"
+shear_modulus = "80 GPa"
+density = 7800.0
+[[rotor.disc]]
+node = 3
+diameter = "0.2 m"
+thickness = "30 mm"
+density = 7800.0
+[[rotor.bearing]]
+node = 1
+stiffness = 2e7
+damping = 3e3
+[[rotor.bearing]]
+node = 5
+stiffness = 2e7
+damping = 3e3
+[[rotor.unbalance]]
+node = 3
+mass = "5 g"
+radius = "90 mm"
+[rotor.damping]
+alpha = 40.0
+[[stator]]
+kind = "bore"
+node = 3
+mass = "2 kg"
+stiffness = "4e6 N/m"
+damping = "400 N*s/m"
+[[stator]]
+kind = "bore"
+node = 5
+radius = "15 mm"
+rigid = true
+friction_factor = 0.5
+"""
+STUDY = """
+rig = "pump.toml"
+[grid]
+speed = ["1000 rpm", "2000 rpm"]
+clearance = ["0.2 mm", "0.3 mm"]
+friction = 0.25
+[contact]
+normal = "updated"
+law = "penalty"
+stiffness = "1e7 N/m"
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    (tmp_path / "pump.toml").write_text(RIG)
+    (tmp_path / "study.toml").write_text(STUDY)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def run(*arguments):
+    result = CliRunner().invoke(whirl, list(arguments))
+    if result.exception:
+        raise result.exception
+    return result.output
+
+
+def test_answer_gives_the_friction_up_to_a_speed_and_the_frequency_of_whirl(folder):
+    document = json.loads(run("pump.toml", "--clearance", "0.2 mm", "--frequency", "200 Hz", "--json"))
+    bore, other = document["bores"]
+    assert (bore["stator"], bore["node"], other["node"]) == (1, 3, 5)
+    assert set(document) == {
+        "answer",
+        "speed",
+        "clearance",
+        "most_frequency",
+        "bores",
+        "thresholds",
+        "whirls",
+    }
+    assert document["most_frequency"] == pytest.approx(400 * math.pi)
+    assert document["clearance"] == [2e-4]
+    assert bore["least_friction"][0] == [None], "at standstill nothing whirls"
+    least = min(row["friction"] for row in document["thresholds"] if row["stator"] == 1)
+    assert least == pytest.approx(min(row[0] for row in bore["least_friction"][1:]))
+    at = next(row for row in document["thresholds"] if row["friction"] == least)
+    top = 30 / math.pi * document["speed"][-1]
+    hertz = abs(at["frequency"]) / (2 * math.pi)
+    begin, _, end = document["answer"][0].partition("; ")
+    assert begin.startswith(
+        f"Stator 1, node 3: no dry whirl of up to 200 Hz below a friction of {least:.3g} up to "
+    )
+    assert float(begin.split(" up to ")[-1].removesuffix(" rpm")) == pytest.approx(top, rel=1e-3)
+    assert end.startswith(f"above it whip at {hertz:.3g} Hz")
+    assert not document["whirls"]
+
+
+def test_a_study_gives_speeds_clearances_friction_and_law(folder):
+    document = json.loads(run("study.toml", "--json"))
+    assert document["speed"] == pytest.approx([1000 * math.pi / 30, 2000 * math.pi / 30])
+    assert document["clearance"] == pytest.approx([2e-4, 3e-4])
+    assert {row["friction"] for row in document["whirls"]} == {0.25}
+    hard = json.loads(
+        run("pump.toml", "--speed", "1000 rpm", "--clearance", "0.2 mm", "--friction", "0.25", "--json")
+    )
+    first = min(hard["whirls"], key=lambda row: abs(row["frequency"]))
+    soft = next(row for row in document["whirls"] if row["frequency"] == pytest.approx(first["frequency"]))
+    assert soft["normal_force"] > first["normal_force"], "the spring of the contact lets the orbit grow"
+    assert "; at 0.25 " in document["answer"][0]
+    assert "; at 0.3 " in run("study.toml", "--friction", "0.3", "--speed", "1500 rpm")
+
+
+def test_table_lists_whirls_with_their_stability(folder):
+    lines = run("pump.toml", "--speed", "1000 rpm", "--clearance", "0.2 mm", "--friction", "0.3").splitlines()
+    head = next(i for i, line in enumerate(lines) if line.split()[:2] == ["stator", "rpm"])
+    assert lines[head + 1].split()[:3] == ["1", "1000.0", "200.0"]
+    assert all("stable" in line or "grows by" in line for line in lines[head + 1 :])
+    begins = run("pump.toml", "--clearance", "0.2 mm").splitlines()
+    assert any("needs" in line.split() for line in begins)
+
+
+def test_chart_and_data_are_written(folder):
+    given = ["pump.toml", "--clearance", "0.2 mm", "--friction", "0.2", "--speed", "900 rpm"]
+    run(*given, "--figure", "whirl.png", "--data", "whirl.nc")
+    assert (folder / "whirl.png").stat().st_size > 10_000
+    assert (folder / "whirl.nc").stat().st_size > 1_000
+
+
+def test_what_is_missing_is_asked_for(folder):
+    with pytest.raises(InputError, match="--clearance: missing"):
+        run("pump.toml")
+    with pytest.raises(InputError, match="--range: conflicts with --speed"):
+        run("pump.toml", "--clearance", "1e-4", "--speed", "1", "--range", "1", "2")
+    with pytest.raises(InputError, match=r"rig mokhtar2017: has no bore"):
+        run("mokhtar2017", "--clearance", "1e-4")
