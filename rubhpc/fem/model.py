@@ -340,6 +340,11 @@ class Model:
         return 0 if self.probe is None else self.probe.constant.size
 
     @property
+    def n_push(self) -> int:
+        """Number of stators whose contact forces are recorded as vectors: all, where one is a bore."""
+        return len(self.stators) * any(stator.is_bore for stator in self.stators)
+
+    @property
     def probe_rows(self) -> NDArray[np.float64]:
         """What is seen of displacements, velocities and accelerations, (3, n_probe, n_all)."""
         return np.zeros((3, 0, self.body_start[-1])) if self.probe is None else self.probe.rows

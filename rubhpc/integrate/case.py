@@ -32,6 +32,7 @@ from rubhpc.integrate.measuring.measures import measures_of
 from rubhpc.integrate.measuring.monitors import carrier_displacement, monitored
 from rubhpc.integrate.measuring.orbit_measures import period
 from rubhpc.integrate.measuring.regimes import LASTING, LEAST_REVOLUTIONS, by_growth, regime
+from rubhpc.integrate.measuring.rub_in_bores import rub_measures
 from rubhpc.integrate.measuring.samples import (
     add_sag,
     by_name,
@@ -54,7 +55,7 @@ from rubhpc.integrate.transient import pass_revolutions, pass_transient
 from rubhpc.kernels._jit import plain
 from rubhpc.kernels.laws import is_set_valued
 from rubhpc.kernels.trail import BROKEN
-from rubhpc.schema import DONE, REGIME, SECTION_NAMES, lyapunov_variables
+from rubhpc.schema import DONE, REGIME, SECTION_NAMES, bore_variables, lyapunov_variables
 from rubhpc.spectra import amplitude_spectrum
 from rubhpc.study.initial import Initial
 
@@ -257,9 +258,11 @@ def _integrate(
             settings,
             final,
             by_name(samples.whole[:, :n_kept], setup.model),
+            has_bore=setup.model.n_push > 0,
         )
     else:
         signals = by_name(samples.whole, setup.model)
+        turn = 2.0 * math.pi / abs(setup.spin)
         judge = (
             judge_of(march, start, setup, clearance, friction, recording, final, trail)
             if motion is None
@@ -284,7 +287,8 @@ def _integrate(
             )
             | monitored(samples, accumulator, setup.model, is_round=setup.is_updated)
             | {"carrier_displacement": carrier_displacement(samples, setup.model)}
-            | probe_extents(signals),
+            | probe_extents(signals)
+            | rub_measures(samples.push, accumulator, recording.revolutions * turn, setup.model),
             settings=settings,
             final=final,
             probed=recording.probed,
@@ -309,7 +313,8 @@ def _counted(record: Record, n_transient: int, n_step: int, n_left: int) -> Reco
 def _spectra(samples: Samples, model: Model) -> dict[str, Floats]:
     """Spectra of all signals, by their names in the schema."""
     spectra = by_name(amplitude_spectrum(samples.whole), model)
-    return {f"spectrum_{name}": spectrum for name, spectrum in spectra.items()}
+    unasked = bore_variables()
+    return {f"spectrum_{name}": spectrum for name, spectrum in spectra.items() if name not in unasked}
 
 
 def exponents_of(

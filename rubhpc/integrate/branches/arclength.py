@@ -10,7 +10,14 @@ import numpy as np
 
 from rubhpc.errors import InputError
 from rubhpc.integrate.branches.events import Event, half_change, halving
-from rubhpc.integrate.branches.grazing import grazing, grazing_beside, passed, touches
+from rubhpc.integrate.branches.grazing import (
+    closed_around,
+    grazing,
+    grazing_beside,
+    grazing_between,
+    passed,
+    touches,
+)
 from rubhpc.integrate.branches.point import away_from_events
 from rubhpc.integrate.branches.weak_impact import weakly_impacting
 from rubhpc.integrate.periodic_motions.piecewise_motion import Unfollowed
@@ -128,6 +135,8 @@ def follow(
                     follower = _beyond(branching, history[-2:], base, point)
                 elif len(history) > 1 and (other := _beyond(branching, history[-2:], base, base)):
                     corner_there = grazing_beside(branching, base, other)  # behind a sharp corner
+                    if corner_there is None and any(closed_around(base)):  # an orbit that fills a bore
+                        corner_there = grazing_between(branching, base, other)
                     if corner_there and _is_close(branching, base, corner_there.point):
                         point, follower = corner_there.point, other
                 if point is None:
@@ -216,11 +225,12 @@ def _beyond(branching: Branching, history: list[Point], base: Point, grazing_poi
     sense = np.sign(grazing_point.value - history[0].value)
     along = grazing_point.parameter_axis
     for steps in BEYOND:
-        for direction in (sense, -sense):
-            with suppress(NotConverged):
-                found = branching.correct(grazing_point, direction * steps * along, along, most=12)
-                if follows(found):
-                    return found
+        for start in (grazing_point, *closed_around(grazing_point)):
+            for direction in (sense, -sense):
+                with suppress(NotConverged):
+                    found = branching.correct(start, direction * steps * along, along, most=12)
+                    if follows(found):
+                        return found
     return None
 
 

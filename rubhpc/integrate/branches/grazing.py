@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from contextlib import suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -11,8 +12,10 @@ import numpy as np
 from rubhpc.integrate.branches.branching import STEEP
 from rubhpc.integrate.branches.events import Event, crossings, tolerance_of
 from rubhpc.integrate.branches.weak_impact import DEPTH, weakly_impacting
+from rubhpc.integrate.periodic_motions.collocated_motion import code_of, states_of
 from rubhpc.integrate.periodic_motions.revolution import least_of
 from rubhpc.integrate.periodic_motions.shooting import NotConverged
+from rubhpc.kernels.collocation.structures import FORWARD, OPEN
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -74,8 +77,23 @@ def passed(
 
 
 def touches(point: Point) -> Counter[int]:
-    """Touches of each pair in a period."""
-    return Counter(pair for _, touching in point.sequence for pair in touching)
+    """Touches of each pair in a period; one of a bore that is closed all the time, all around."""
+    found = Counter(pair for _, touching in point.sequence for pair in touching)
+    for i, stator in enumerate(point.case.setup.model.stators):
+        if stator.is_bore and not found[i] and states_of(point.states, point.case.q)[i] != OPEN:
+            found[i] = 1
+    return found
+
+
+def closed_around(point: Point) -> list[Point]:
+    """The start of a motion, one for each bore that it never touches, with that pair closed all the time."""
+    is_bore = [
+        stator.is_bore and not touches(point)[i] for i, stator in enumerate(point.case.setup.model.stators)
+    ]
+    return [
+        replace(point, states=point.states | code_of(FORWARD * (np.arange(point.case.q) == i)))
+        for i in np.flatnonzero(is_bore)
+    ]
 
 
 def distances(point: Point) -> Floats:
