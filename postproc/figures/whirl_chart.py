@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,20 +19,26 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
+    Ints = NDArray[np.int64]
 
 _RPM = 30 / math.pi
 _MARKERS = {SLIPPING: "o", ROLLING: "^"}
-_LEVEL: dict[str, Any] = {"color": "0.5", "linewidth": 0.6, "linestyle": (0, (4, 2))}
-_WIDE = 50.0  # ratio of frequencies from which their axis is logarithmic
+_DASHES: tuple[Any, ...] = ("-", (0, (4, 1.5)), (0, (1, 1.2)))
+_SAFE: dict[str, Any] = {"color": "0.92", "linewidth": 0}
+_RANGE: dict[str, Any] = {"color": "0.6", "linewidth": 0.6}
+_WIDE = 8.0  # ratio of frequencies from which their axis is logarithmic
+_NEAR = 0.12  # relative distance of frequencies at neighbouring speeds that a line joins
+_ROOM = 0.05  # of the height: between the names of two lines
 
 
 def draw_whirl(found: xr.Dataset) -> Drawing:
     """Return the chart of `rubhpc.dry_whirl`: a row of two panels for each bore.
 
-    Over the speed, or of a single one over the clearance: the least friction that whirl needs, with dots
-    where it begins in other ranges of frequency; and the frequencies of whirls at the frictions given, full
-    where stable, or else those at which whirl begins. Of a single speed and clearance: the friction over the
-    frequency.
+    Over the speed, or of a single one over the clearance. On the left the friction that whirl needs: below
+    the shaded limit none exists; thin lines show the ranges of frequencies in which it can begin, with their
+    frequency at the end. On the right the frequencies of whirls at the frictions given, full where they are
+    stable, or else those at which whirl begins. Of a single speed and clearance, one panel: the friction over
+    the frequency.
 
     Parameters
     ----------
@@ -49,7 +56,10 @@ def draw_whirl(found: xr.Dataset) -> Drawing:
             else:
                 _draw_friction(row[0], found, i, along)
                 _draw_frequency(row[1], found, i, along)
-            row[0].set_title(f"Stator {int(found['stator'][i])}, node {int(found['node'][i])}", fontsize=7)
+                for ax in row if i < n_bore - 1 else ():
+                    ax.set_xlabel("")
+            row[0].set_title(f"Stator {int(found['stator'][i])}, node {int(found['node'][i])}")
+        _legend(axes[0], found, along)
         return axes
 
     return Drawing(
@@ -57,81 +67,105 @@ def draw_whirl(found: xr.Dataset) -> Drawing:
         draw=draw,
         panels=(n_bore, n_column),
         is_shared=False,
-        height=12 + 45 * n_bore,
-        width=88 if n_column == 1 else 150,
+        height=20 + 42 * n_bore,
+        width=88 if n_column == 1 else 160,
     )
 
 
 def _draw_friction(ax: Axes, found: xr.Dataset, i: int, along: str) -> None:
-    """Draw the friction above which whirl exists, and dots where it begins in each range of frequencies."""
+    """Draw the friction above which whirl exists, and the one at which it begins in each range."""
     x, label = _abscissa(found, along)
     lines = found["least_friction"].isel(stator=i).transpose(along, ...).values.reshape(x.size, -1)
-    dots = _select(found, "threshold", i)
-    ax.plot(
-        _places(dots, "threshold", along),
-        dots["threshold_friction"].values,
-        linestyle="",
-        marker=".",
-        color="0.7",
-        markersize=2,
-    )
-    gaps = found["clearance"]
-    for k, line in enumerate(lines.T):
-        name = written_value(gaps[k]) if along == "speed" and gaps.size > 1 else None
-        ax.plot(
-            x, np.where(np.isfinite(line), line, np.nan), color=f"C{k}", marker="o", markersize=2, label=name
+    _, top = _limits(found, lines)
+    shaded, least = _outline(x, np.minimum(lines.min(axis=1), top), top)
+    ax.fill_between(shaded, least, **_SAFE)
+    some = _select(found, "threshold", i)
+    places, needed = _places(some, "threshold", along), some["threshold_friction"].values
+    hertz = _hertz(some, "threshold")
+    names = []
+    for clearance in np.unique(some["threshold_clearance"].values) if along == "speed" else [None]:
+        is_here = (
+            np.ones(needed.size, bool) if clearance is None else some["threshold_clearance"] == clearance
         )
-    _draw_levels(ax, found)
-    ax.set(xlabel=label, ylabel="Friction needed", xlim=_ends(x), ylim=_limits(found, lines))
-    if not np.isfinite(lines).any():
-        _write_none(ax)
-    if ax.get_legend_handles_labels()[1]:
-        ax.legend(loc="best", fontsize=6)
+        for branch in _branches(places, hertz, np.flatnonzero(is_here)):
+            ax.plot(places[branch], needed[branch], **_RANGE)
+            end = branch[-1]
+            if places[end] == x[-1] and needed[end] < top:
+                names.append((needed[end] / top, f"{hertz[end]:.3g} Hz"))
+    for k, line in enumerate(lines.T):
+        ax.plot(x, np.where(np.isfinite(line), line, np.nan), color="k", linestyle=_DASHES[k % len(_DASHES)])
+    for k, friction in enumerate(found.attrs["frictions"]):
+        ax.axhline(friction, color=f"C{k}", linewidth=0.7)
+    ax.set(xlabel=label, ylabel="Friction needed", xlim=(x.min(), x.max()), ylim=(0.0, top))
+    _name_ends(ax, names)
+    _write_none(ax, 0.5 * float(np.median(least)) / top)
+
+
+def _outline(x: Floats, least: Floats, top: float) -> tuple[Floats, Floats]:
+    """The limit of friction, with a step half way between a place with whirl and one without."""
+    at = np.flatnonzero(np.diff(least == top))
+    middle = np.repeat((x[at] + x[at + 1]) / 2, 2)
+    ends = np.stack([least[at], least[at + 1]], axis=1).ravel()
+    where = np.repeat(at + 1, 2)
+    return np.insert(x, where, middle), np.insert(least, where, ends)
+
+
+def _name_ends(ax: Axes, names: list[tuple[float, str]]) -> None:
+    """Write names where lines end at the right, by height: from the lowest on, those with room."""
+    free = -math.inf
+    for height, name in sorted(set(names)):
+        if height > free:
+            ax.annotate(
+                name,
+                (1.0, height),
+                (2, 0),
+                xycoords="axes fraction",
+                textcoords="offset points",
+                fontsize=6,
+                color="0.35",
+                va="center",
+            )
+            free = height + _ROOM
 
 
 def _draw_frequency(ax: Axes, found: xr.Dataset, i: int, along: str) -> None:
     """Draw the frequencies of whirls, full where they are stable, or else those at which whirl begins."""
+    from matplotlib.ticker import LogLocator
+
     dim = "whirl" if found.attrs["frictions"] else "threshold"
     some = _select(found, dim, i)
     x, label = _abscissa(found, along)
-    levels = found.attrs["frictions"] or [None]
-    places, hertz = _places(some, dim, along), np.abs(some[f"{dim}_frequency"].values) / (2 * math.pi)
-    kind = some[f"{dim}_kind"].values
-    is_full = some["whirl_growth_rate"].values < 0.0 if dim == "whirl" else np.ones(kind.size, dtype=bool)
-    for k, level in enumerate(levels):
-        here = np.ones(kind.size, dtype=bool) if level is None else some[f"{dim}_friction"].values == level
-        for word, marker in _MARKERS.items():
-            for full in (True, False):
-                chosen = here & (kind == word) & (is_full == full)
-                style: dict[str, Any] = {"markerfacecolor": f"C{k}" if full else "white", "color": f"C{k}"}
-                name = _name(word, level, full) if chosen.any() else None
-                ax.plot(
-                    places[chosen],
-                    hertz[chosen],
-                    linestyle="",
-                    marker=marker,
-                    markersize=3.5,
-                    markeredgewidth=0.6,
-                    label=name,
-                    **style,
-                )
-    ax.set(xlabel=label, ylabel="Whirl frequency (Hz)", xlim=_ends(x))
+    room = 0.03 * float(np.ptp(x))
+    ax.set(xlabel=label, ylabel="Whirl frequency (Hz)", xlim=(x.min() - room, x.max() + room))
+    places, hertz = _places(some, dim, along), _hertz(some, dim)
     if not hertz.size:
-        _write_none(ax)
+        _write_none(ax, 0.5)
         ax.set_yticks([])
         return
+    kind, clearance = some[f"{dim}_kind"].values, some[f"{dim}_clearance"].values
+    is_full = _is_stable(some) if dim == "whirl" else np.ones(kind.size, dtype=bool)
+    gaps = np.unique(clearance) if along == "speed" else [None]
+    for k, level in enumerate(found.attrs["frictions"] or [None]):
+        color = "k" if level is None else f"C{k}"
+        for word, gap in product(NAMES, gaps):
+            is_here = (kind == word) & (gap is None or clearance == gap)
+            if level is not None:
+                is_here &= some[f"{dim}_friction"].values == level
+            near = _NEAR if word == SLIPPING else math.inf  # rolling follows the rim, and there is one
+            for branch in _branches(places, hertz, np.flatnonzero(is_here), near):
+                ax.plot(places[branch], hertz[branch], color=color, linewidth=0.5)
+            for full, fill in ((True, color), (False, "white")):
+                chosen = is_here & (is_full == full)
+                ax.plot(places[chosen], hertz[chosen], **_mark(word, color, fill))
     if along == "speed":
-        ax.plot(x, np.abs(x) / 60.0, color="0.6", linewidth=0.5, zorder=1, label="1X")
+        ax.plot(x, np.abs(x) / 60.0, color="0.6", linewidth=0.5, zorder=1)
     if hertz.max() > _WIDE * hertz.min():
         ax.set(yscale="log", ylim=(0.7 * hertz.min(), 1.4 * hertz.max()))
+        ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        ax.yaxis.set_major_formatter("{x:g}")
         ax.yaxis.set_minor_formatter("")
     else:
         ax.set_ylim(0.0, 1.1 * hertz.max())
-    ax.legend(loc="best", fontsize=6)
-
-
-def _write_none(ax: Axes) -> None:
-    ax.text(0.5, 0.5, "no dry whirl", transform=ax.transAxes, ha="center", va="center")
 
 
 def _draw_curve(ax: Axes, found: xr.Dataset, i: int) -> None:
@@ -140,42 +174,87 @@ def _draw_curve(ax: Axes, found: xr.Dataset, i: int) -> None:
     needed = curve["curve_friction"].values
     hertz = curve["curve_frequency"].values / (2 * math.pi)
     ax.plot(hertz, needed, color="k")
-    _draw_levels(ax, found)
     some = _select(found, "whirl", i)
-    for word, marker in _MARKERS.items():
-        for full in (True, False):
-            chosen = (some["whirl_kind"].values == word) & ((some["whirl_growth_rate"].values < 0.0) == full)
-            if chosen.any():
-                ax.plot(
-                    some["whirl_frequency"].values[chosen] / (2 * math.pi),
-                    some["whirl_friction"].values[chosen],
-                    linestyle="",
-                    marker=marker,
-                    color="C1",
-                    markerfacecolor="C1" if full else "white",
-                    label=_name(word, None, full),
-                )
-    shown = hertz[needed < _limits(found, needed)[1]]
+    is_full = _is_stable(some)
+    for k, friction in enumerate(found.attrs["frictions"]):
+        ax.axhline(friction, color=f"C{k}", linewidth=0.7)
+        for word, (full, fill) in product(NAMES, ((True, f"C{k}"), (False, "white"))):
+            chosen = (some["whirl_kind"].values == word) & (some["whirl_friction"].values == friction)
+            chosen &= is_full == full
+            at = some["whirl_frequency"].values[chosen] / (2 * math.pi)
+            ax.plot(at, some["whirl_friction"].values[chosen], **_mark(word, f"C{k}", fill))
+    top = _limits(found, needed)[1]
+    shown = hertz[needed < top]
+    ax.set(xlabel="Whirl frequency (Hz), forward positive", ylabel="Friction needed", ylim=(0.0, top))
     if shown.size:
-        room = 0.05 * (np.ptp(shown) or abs(shown[0]))
-        ax.set_xlim(shown.min() - room, shown.max() + room)
-    ax.set(
-        xlabel="Whirl frequency (Hz), negative: backward",
-        ylabel="Friction needed",
-        ylim=_limits(found, needed),
-    )
-    if ax.get_legend_handles_labels()[1]:
-        ax.legend(loc="best", fontsize=6)
+        ends = [*shown, *some["whirl_frequency"].values / (2 * math.pi)]
+        room = 0.03 * float(np.ptp(ends))
+        ax.set_xlim(min(ends) - room, max(ends) + room)
+    else:
+        _write_none(ax, 0.5)
 
 
-def _name(kind: str, friction: float | None, is_full: bool) -> str:
-    at = "" if friction is None else f" at {friction:g}"
-    return f"{NAMES[kind]}{at}" + ("" if is_full else ", unstable")
+def _legend(ax: Axes, found: xr.Dataset, along: str | None) -> None:
+    """Name frictions, kinds of whirl and clearances below the panels."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    gaps, frictions = found["clearance"], found.attrs["frictions"]
+    handles: list[Any] = [
+        Line2D([], [], color=f"C{k}", label=f"friction {mu:g}") for k, mu in enumerate(frictions)
+    ]
+    dim = "whirl" if frictions else "threshold"
+    is_full = _is_stable(found) if frictions else np.ones(found.sizes[dim], dtype=bool)
+    for (word, name), full in product(NAMES.items(), (True, False)):
+        if ((found[f"{dim}_kind"].values == word) & (is_full == full)).any() and (along or frictions):
+            label = f"{'stable' if full else 'unstable'} {name}" if frictions else f"{name} begins"
+            handles.append(Line2D([], [], label=label, **_mark(word, "k", "k" if full else "white")))
+    if along:
+        handles.append(Patch(label="no dry whirl", **_SAFE))
+    if along == "speed":
+        for k, gap in enumerate(gaps if gaps.size > 1 else ()):
+            name = f"clearance {written_value(gap)}"
+            handles.append(Line2D([], [], color="k", linestyle=_DASHES[k % len(_DASHES)], label=name))
+        handles.append(Line2D([], [], color="0.6", linewidth=0.5, label="1X"))
+    if handles:
+        n_column = min(len(handles), 5 if along else 3)
+        ax.figure.legend(handles=handles, loc="outside lower center", ncols=n_column, frameon=False)
 
 
-def _draw_levels(ax: Axes, found: xr.Dataset) -> None:
-    for friction in found.attrs["frictions"]:
-        ax.axhline(friction, **_LEVEL)
+def _mark(word: str, color: str, fill: str) -> dict[str, Any]:
+    """The marker of a whirl: its kind by shape, its friction by colour, full where it is stable."""
+    return {
+        "linestyle": "",
+        "marker": _MARKERS[word],
+        "markersize": 3.2,
+        "markeredgewidth": 0.6,
+        "color": color,
+        "markerfacecolor": fill,
+    }
+
+
+def _branches(x: Floats, y: Floats, chosen: Ints, near: float = _NEAR) -> list[Ints]:
+    """Join points at neighbouring abscissas to lines: those that are each other's nearest, and near."""
+    lines: list[list[int]] = []
+    last: list[list[int]] = []
+    for place in np.unique(x[chosen]):
+        here = chosen[x[chosen] == place]
+        apart = np.array([[abs(math.log(y[k] / y[line[-1]])) for k in here] for line in last])
+        new = set(here.tolist())
+        for row, line in enumerate(last):
+            column = int(apart[row].argmin())
+            if apart[row, column] < near and apart[:, column].argmin() == row:
+                line.append(int(here[column]))
+                new.discard(line[-1])
+        lines += (begun := [[k] for k in sorted(new)])
+        last = [line for line in last if x[line[-1]] == place] + begun
+    return [np.array(line) for line in lines]
+
+
+def _write_none(ax: Axes, height: float) -> None:
+    """Write that nothing whirls, where there is room for it."""
+    if height > _ROOM:
+        ax.text(0.5, height, "no dry whirl", transform=ax.transAxes, ha="center", va="center", fontsize=7)
 
 
 def _limits(found: xr.Dataset, needed: Floats) -> tuple[float, float]:
@@ -183,6 +262,10 @@ def _limits(found: xr.Dataset, needed: Floats) -> tuple[float, float]:
     there = needed[np.isfinite(needed)]
     least, most = (float(there.min()), min(float(there.max()), 1.0)) if there.size else (0.0, 0.0)
     return 0.0, 1.1 * max([*found.attrs["frictions"], 1.2 * least, most]) or 1.0
+
+
+def _is_stable(some: xr.Dataset) -> NDArray[np.bool_]:
+    return np.asarray(some["whirl_growth_rate"].values < 0.0)
 
 
 def _select(found: xr.Dataset, dim: str, i: int) -> xr.Dataset:
@@ -200,6 +283,5 @@ def _places(some: xr.Dataset, dim: str, along: str) -> Floats:
     return np.asarray(factor * some[f"{dim}_{along}"].values)
 
 
-def _ends(x: Floats) -> tuple[float, float]:
-    room = 0.03 * float(np.ptp(x))
-    return float(x.min()) - room, float(x.max()) + room
+def _hertz(some: xr.Dataset, dim: str) -> Floats:
+    return np.asarray(np.abs(some[f"{dim}_frequency"].values) / (2 * math.pi))

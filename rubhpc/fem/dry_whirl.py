@@ -20,7 +20,7 @@ from rubhpc.rig.normal_law import NormalLaw
 from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
     from typing import Any
 
     from numpy.typing import ArrayLike, NDArray
@@ -172,17 +172,20 @@ def dry_whirl(
 
 
 def in_words(found: xr.Dataset) -> list[str]:
-    """Return a sentence for each bore: where dry whirl begins, and which exists at the frictions given."""
+    """Return sentences for each bore: where dry whirl begins, and which exists at the frictions given."""
     speeds, limit = found["speed"].values, found.attrs["most_frequency"]
-    span = f"at {_rpm(speeds[0])}" if speeds.size == 1 else f"up to {_rpm(speeds[np.abs(speeds).argmax()])}"
-    return [_sentence(found, i, span, limit) for i in range(found.sizes["stator"])]
+    if speeds.size == 1:
+        span = f"at {_rpm(speeds[0])}" + (f" up to {_hertz(limit)}" if math.isfinite(limit) else "")
+    else:
+        span = f"up to {_rpm(speeds[np.abs(speeds).argmax()])}"
+        span += f" and {_hertz(limit)}" if math.isfinite(limit) else ""
+    return [_sentences(found, i, span) for i in range(found.sizes["stator"])]
 
 
-def _sentence(found: xr.Dataset, i: int, span: str, limit: float) -> str:
+def _sentences(found: xr.Dataset, i: int, span: str) -> str:
     bore = int(found["stator"][i])
     at = found.isel(threshold=found["threshold_stator"].values == bore)
-    below = f" of up to {_hertz(limit)}" if math.isfinite(limit) else ""
-    text = f"Stator {bore}, node {int(found['node'][i])}: no dry whirl{below}"
+    text = f"Stator {bore}, node {int(found['node'][i])}: no dry whirl"
     needed = at["threshold_friction"].values
     if not np.isfinite(needed).any():
         text += f" {span}, whatever the friction"
@@ -193,10 +196,10 @@ def _sentence(found: xr.Dataset, i: int, span: str, limit: float) -> str:
         slow = np.flatnonzero(size < 1.1 * size.min())  # the range of the lowest frequency, at all speeds
         first = int(slow[np.nanargmin(needed[slow])])
         if size[first] < 0.9 * size[k]:
-            text += f", and {_named(at, 'threshold', first)} above {needed[first]:.3g}"
-    for mu in found.attrs["frictions"]:
-        is_at = (found["whirl_stator"] == bore) & (found["whirl_friction"] == mu)
-        text += f"; at {mu:g} {_listed(found.isel(whirl=np.flatnonzero(is_at)))}"
+            text += f", and above {needed[first]:.3g} {_named(at, 'threshold', first)}"
+        for mu in found.attrs["frictions"]:
+            is_at = (found["whirl_stator"] == bore) & (found["whirl_friction"] == mu)
+            text += f". At {mu:g}: {_listed(found.isel(whirl=np.flatnonzero(is_at)))}"
     return text + (" (approximate)." if bool(found["is_approximate"][i].any()) else ".")
 
 
@@ -208,19 +211,23 @@ def _named(found: xr.Dataset, dim: str, k: int) -> str:
 
 
 def _listed(found: xr.Dataset) -> str:
-    """Whirls at one bore and friction: frequencies and stability of each kind."""
+    """Whirls at one bore and friction: frequencies and speeds of each kind, the stable ones first."""
     parts = []
-    for kind, word in NAMES.items():
-        some = found.isel(whirl=np.flatnonzero(found["whirl_kind"].values == kind))
-        if not some.sizes["whirl"]:
-            continue
-        size = np.abs(some["whirl_frequency"].values)
-        ends = list(dict.fromkeys(_hertz(end) for end in (size.min(), size.max())))
-        is_stable = some["whirl_growth_rate"].values < 0.0
-        state = "stable" if is_stable.all() else "partly stable" if is_stable.any() else "unstable"
-        slowest = _rpm(np.abs(some["whirl_speed"].values).min())
-        parts.append(f"{word} at {' to '.join(ends)} ({state}) from {slowest} on")
-    return " and ".join(parts) or "none"
+    is_stable = found["whirl_growth_rate"].values < 0.0
+    for state, is_so in (("stable", is_stable), ("unstable", ~is_stable)):
+        for kind, word in NAMES.items():
+            some = found.isel(whirl=np.flatnonzero(is_so & (found["whirl_kind"].values == kind)))
+            if some.sizes["whirl"]:
+                hertz, rpm = (_span(some[f"whirl_{of}"].values, write) for of, write in _SPANS.items())
+                parts.append(f"{state} {word} at {hertz}" + f", {rpm}" * (found.sizes["speed"] > 1))
+    return "; ".join(parts) or "none"
+
+
+def _span(values: Floats, write: Callable[[float], str]) -> str:
+    """From the smallest to the largest of some values."""
+    size = np.abs(values)
+    (low, unit), (high, _) = (write(end).split() for end in (size.min(), size.max()))
+    return f"{high} {unit}" if low == high else f"{low} to {high} {unit}"
 
 
 def _rpm(speed: float) -> str:
@@ -229,6 +236,9 @@ def _rpm(speed: float) -> str:
 
 def _hertz(frequency: float) -> str:
     return f"{float(f'{frequency / (2.0 * math.pi):.3g}'):g} Hz"
+
+
+_SPANS = {"frequency": _hertz, "speed": _rpm}  # how each is written
 
 
 def thinned(values: ArrayLike, most: int) -> Floats:

@@ -31,11 +31,12 @@ if TYPE_CHECKING:
 FORWARD = np.array([1.0, 1j])  # v + i w of (v, w)
 _RESOLVED = 0.05  # change of a receptance over its size, within a cell of `cells`
 _NARROWEST = 1e-9  # width of a cell over its frequency
+_UNDAMPED = 1e-8  # least ratio of damping, for the sake of numbers
 _SEEN = 1e-9  # share in a receptance at its own resonance, below which a mode is left out
 _ANISOTROPIC = 1e-7  # backward over forward response, from which a body is called anisotropic
-_SOFT = (
-    1e-6  # frequency over the lowest one that a rigid-body mode is given: a double pole has no sum of modes
-)
+_FILL = np.array([10.0, 20.0])  # rates of decay of what replaces fast modes, over the limit
+# Frequency over the lowest one that a rigid-body mode is given: a double pole has no sum of modes.
+_SOFT = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -66,6 +67,24 @@ class Receptance:
     def scaled(self, factor: float) -> Receptance:
         """Return the receptance multiplied by a factor."""
         return Receptance(pole=self.pole, residue=factor * self.residue, is_mean=self.is_mean)
+
+    def reduced(self, limit: float) -> Receptance:
+        """Return the receptance with two real poles in place of all those faster than a limit (rad/s).
+
+        The two have the static flexibility of those that they replace, and the same sum of residues: a force
+        still moves the body by its inertia alone at first.
+        """
+        is_fast = np.abs(self.pole) > limit
+        if is_fast.sum() <= len(_FILL):
+            return self
+        pole, fast = -limit * _FILL, self.residue[is_fast]
+        asked = np.array([fast.sum(), (fast / self.pole[is_fast]).sum()])
+        filling = np.linalg.solve(np.stack([np.ones(len(pole)), 1.0 / pole]), asked)
+        return Receptance(
+            pole=np.append(self.pole[~is_fast], pole),
+            residue=np.append(self.residue[~is_fast], filling),
+            is_mean=self.is_mean,
+        )
 
     def at(self, frequency: float | Floats) -> Complex:
         """Return the receptance at whirl frequencies (rad/s), an array of their shape, m/N."""
@@ -173,6 +192,8 @@ def _modal(body: Body, rows: NDArray[np.int64]) -> tuple[Complex, Complex, Compl
     is_free = np.diag(stiffness) == 0.0
     stiffness[is_free, is_free] = (_SOFT * sigma[~is_free].min(initial=sigma.max())) ** 2
     pole, vectors = np.linalg.eig(first_order(sigma, stiffness, damping))
+    is_undamped = np.abs(pole.real) < _UNDAMPED * np.abs(pole)
+    pole[is_undamped] = 1j * pole[is_undamped].imag - _UNDAMPED * np.abs(pole[is_undamped])
     n = len(part)
     left = (shapes[here] / sigma) @ vectors[:n]
     right = np.linalg.solve(vectors, np.vstack([np.zeros((n, len(rows))), shapes[here].T]))

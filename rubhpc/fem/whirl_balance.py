@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 SLIPPING, ROLLING = "slipping", "rolling"
 _BEYOND = 1.5  # of the fastest mode: above it no receptance changes its sign
 _NEWTON = 12  # iterations, of which some eight are needed
+_FAST = 20.0  # frequency of modes that stability leaves out, over the highest whirl frequency
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,11 +96,12 @@ class Balance:
         law: NormalLaw,
         most_frequency: float = math.inf,
     ) -> None:
-        self._rotor, self._hole, self._twist, self._law = rotor, hole, twist, law
+        self._rotor, self._hole, self._law = rotor, hole, law
         self._receptance = rotor + hole
         self._clearance, self._rim_speed = clearance, radius * spin
         fastest = float(np.abs(self._receptance.pole).max(initial=0.0))
         top = min(most_frequency, max(_BEYOND * fastest, 1.01 * abs(self._rim_speed) / clearance))
+        self._slow, self._slow_twist = (part.reduced(_FAST * top) for part in (self._receptance, twist))
         self._set_cells(*self._receptance.cells(-top, top))
         self._rolling = [w for w in self._zeros(self._slip) if self._presses(w)]
         # The least friction is where it is stationary or zero, where slip or the range ends, or at the limit.
@@ -151,19 +153,20 @@ class Balance:
         """Return the largest growth rate of small changes of a whirl, 1/s: negative where it is stable.
 
         A whirl is a relative equilibrium in the frame that turns with it. The change of its phase, which does
-        not decay, is left out. Rates below -10 times the whirl frequency are not resolved.
+        not decay, is left out. Rates below -10 times the whirl frequency are not resolved, and modes above 20
+        times the highest whirl frequency searched are left out.
         """
         w, rho, N = whirl.frequency, whirl.radius, whirl.normal_force
         T = -rho * (1.0 / complex(self._receptance.at(w))).imag
         is_rolling = whirl.kind == ROLLING
-        twist = self._twist if is_rolling else RIGID
-        pole = np.concatenate([self._receptance.pole - 1j * w, twist.pole])
-        n = len(self._receptance.pole)
+        lateral, twist = self._slow, self._slow_twist if is_rolling else RIGID
+        pole = np.concatenate([lateral.pole - 1j * w, twist.pole])
+        n = len(lateral.pole)
         is_lateral = np.arange(len(pole)) < n
 
         def acts(force: complex, drag: float = 0.0) -> Floats:
             """Effect of a change of N + i T on the modes, and of `drag` on those of the twist."""
-            effect = np.concatenate([force * self._receptance.residue, drag * twist.residue])
+            effect = np.concatenate([force * lateral.residue, drag * twist.residue])
             return np.concatenate([effect.real, effect.imag])
 
         # States: real and imaginary parts of the modes, of the displacement x + i y and of the twist.
@@ -278,4 +281,7 @@ class Balance:
 
 def _root(function: Callable[[Any], Any], low: float, high: float) -> float:
     """Zero of a function that changes its sign between two frequencies, as exactly as they have digits."""
+    before, after = abs(function(low)), abs(function(high))
+    if function(low) * function(high) >= 0.0:  # the sum over modes was rounded otherwise
+        return low if before < after else high
     return float(brentq(lambda w: float(function(w)), low, high, xtol=1e-14 * max(abs(low), abs(high))))

@@ -51,6 +51,42 @@ def test_whip_in_a_ring_that_yields_along_the_normal(friction, frequency, ratio)
     assert bool((found.whirl_frequency < 0.0).all())
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_whip_and_rolling_of_any_disc_in_any_ring(seed):
+    """Roots of the polynomial of `Im gamma + mu sgn(s) Re gamma`, which needs no modes."""
+    draw = np.random.default_rng(seed)
+    k, c, mass, stiffness = draw.uniform(0.01, 1.0), draw.uniform(0.01, 0.5), draw.uniform(0.02, 5.0), 2.0
+    damping, gap, radius, mu = 10.0 ** draw.uniform(-3.0, 0.0), draw.uniform(0.3, 2.0), 2.0, 0.5
+    spin = draw.choice([-1.0, 1.0]) * draw.uniform(0.3, 4.0)
+    ring = Bore(node=1, radius=radius, mass=mass, stiffness=stiffness, damping=damping)
+    found = dry_whirl(disc(ring, k=k, c=c), [spin], [gap], [mu], most_frequency=math.inf)
+    rim, hole = np.poly1d([-1.0, 1j * c, k]), np.poly1d([-mass, 1j * damping, stiffness])
+    product = ((rim + hole) * np.poly1d((rim * hole).coeffs.conj())).coeffs
+
+    def gamma(w):
+        return 1.0 / rim(w) + 1.0 / hole(w)
+
+    expected = []
+    for sign in (1.0, -1.0):
+        roots = np.roots(product.imag + sign * mu * product.real)
+        for w in roots[np.abs(roots.imag) < 1e-9].real:
+            if gamma(w).real < 0.0 and np.sign(radius * spin + gap * w) == sign:
+                expected.append(w)
+    is_slipping = found.whirl_kind.values == SLIPPING
+    assert found.whirl_frequency.values[is_slipping] == pytest.approx(np.sort(expected), rel=1e-7)
+    rolling = -radius * spin / gap
+    value = gamma(rolling)
+    rolls = value.real < 0.0 and abs(value.imag) <= -mu * value.real
+    assert found.whirl_frequency.values[~is_slipping] == pytest.approx([rolling] * int(rolls))
+
+
+def test_bodies_without_damping_whirl_at_their_resonances():
+    """Of a disc in a hard bore: at its natural frequency, with next to no friction; and it rolls."""
+    found = dry_whirl(disc(Bore(node=1, radius=3.0, rigid=True), c=0.0), [1.0], [1.0], [0.1])
+    assert found.whirl_frequency.values == pytest.approx([-3.0, -math.sqrt(K)], rel=1e-6)
+    assert found.least_friction.item() < 1e-6
+
+
 def test_whip_needs_the_friction_at_which_the_spring_gives_way():
     """`mu* = (c / k_s) sqrt((k + k_s) / m)`, of a rim that is never too slow to slip."""
     bore = Bore(node=1, radius=1e9, rigid=True)
@@ -158,6 +194,22 @@ def test_growth_rate_is_that_of_the_equations_of_motion(law, kind):
         expected = np.delete(values, np.abs(values).argmin()).real.max()
         is_limit = kind == ROLLING or law == "lagrange"
         assert balance.growth_rate(whirl) == pytest.approx(expected, rel=1e-4 if is_limit else 1e-6)
+
+
+def test_stability_needs_no_modes_far_above_the_whirl(monkeypatch):
+    """Static flexibility in place of 12 fast modes of 20, against all of them."""
+    frequencies = np.geomspace(1.0, 300.0, 20)
+    rotor = sum((single(1.0, 0.01 * w, w**2) for w in frequencies[1:]), single(1.0, 0.01, 1.0))
+    given = {"spin": 20.0, "radius": 1.0, "clearance": 1.0, "law": HARD, "most_frequency": 1.5}
+    balance = Balance(rotor, single(0.5, 0.05, 4.0), RIGID, **given)
+    rates = [balance.growth_rate(whirl) for whirl in balance.whirls(0.3)]
+    monkeypatch.setattr("rubhpc.fem.whirl_balance._FAST", math.inf)
+    whole = Balance(rotor, single(0.5, 0.05, 4.0), RIGID, **given)
+    assert rates == pytest.approx([whole.growth_rate(whirl) for whirl in whole.whirls(0.3)], rel=1e-3)
+    few, limit = rotor.reduced(30.0), 30.0
+    assert (len(few.pole), len(rotor.pole)) == (2 * (frequencies < limit).sum() + 2, 40)
+    assert few.residue.sum() == pytest.approx(rotor.residue.sum(), abs=1e-9)
+    assert complex(few.at(0.0)) == pytest.approx(complex(rotor.at(0.0)))
 
 
 @pytest.mark.parametrize("seed", range(6))
