@@ -138,8 +138,8 @@ def assemble_carrier(
     for of, slope, (_, _, model) in zip(rows, slopes, stators, strict=True):
         tip = (of[model.axial], of[model.lateral]) if of else (body.index(1, "v"), body.index(1, "w"))
         turn = body.index(1, "thx") if model.is_bore else -1
-        seat = {"axial": tip[0], "lateral": tip[1], "torsion": turn, "squared_slope": slope}
-        placed.append(replace(model, body=body, alone=model, **seat))
+        seated = replace(model, body=body, alone=model, axial=tip[0], lateral=tip[1], torsion=turn)
+        placed.append(replace(seated, squared_slope=slope))
     return CarrierModel(name=carrier.name, body=body, stators=numbers), placed
 
 
