@@ -120,10 +120,11 @@ def assemble_carrier(
         relative = np.hstack([-mounting.shape[:, motions], np.eye(model.body.n_dof)])
         damping[met] += relative.T @ model.body.damping @ relative
         stiffness[met] += relative.T @ model.body.stiffness @ relative
-        slopes.append(None)
+        slope: Floats | None = None
         if model.squared_slope is not None:
-            slopes[-1] = np.zeros_like(mass)
-            slopes[-1][met] = relative.T @ model.squared_slope @ relative
+            slope = np.zeros_like(mass)
+            slope[met] = relative.T @ model.squared_slope @ relative
+        slopes.append(slope)
         kept = [*motions, *range(3, 3 + model.body.n_dof)]
         mass[met] += mounting.mass[np.ix_(kept, kept)]
     body = Body(

@@ -46,6 +46,8 @@ _COLUMNS = {  # of a whirl: unit and name
     "orbit": ("m", "Radius of the orbit of the rim's centre"),
     "hole_orbit": ("m", "Radius of the orbit of the hole's centre"),
     "normal_force": ("N", "Normal force"),
+    "friction_force": ("N", "Friction force"),
+    "rim_speed": ("m s-1", "Speed of the rim"),
 }
 
 
@@ -88,7 +90,7 @@ def dry_whirl(
         whirl: all whirls at each of the frictions. Both have columns `threshold_` and `whirl_`: `stator`,
         `speed` (rad/s), `clearance` (m), `friction` (of the case), `frequency` (rad/s, positive in the sense
         of positive spin), `kind` ("slipping" or "rolling"), `orbit` and `hole_orbit` (m, radii of the orbits
-        of both centres), `normal_force` (N); `whirl_growth_rate` (1/s), negative where it is stable.
+        of both centres), `normal_force` and `friction_force` (N), `rim_speed` (m/s); `whirl_growth_rate` (1/s), negative where it is stable.
 
         Over point, at the highest speed and the first clearance: `curve_stator`, `curve_frequency` (rad/s)
         and `curve_friction` that a slipping whirl of this frequency needs.
@@ -136,6 +138,7 @@ def dry_whirl(
                     parts[0].is_mean or parts[1].is_mean or _offset(turning, stator) > _OFFSET * radial
                 )
                 of = {"stator": bores[i] + 1, "speed": spin, "clearance": gap}
+                of["rim_speed"] = spin * stator.radius
                 for whirl in balance.thresholds():
                     thresholds.append(of | asdict(whirl) | {"friction": whirl.friction / factor})
                     least[i, j, k] = np.fmin(least[i, j, k], whirl.friction / factor)

@@ -50,8 +50,8 @@ class Whirl:
         The coefficient that it needs: exactly, while it slips; at least, while it rolls.
     radius : float
         Distance of the centres of rim and hole, m; infinite at the limit of what a penalty's spring holds.
-    normal_force : float
-        N.
+    normal_force, friction_force : float
+        N; the latter on the rotor against the sense of positive spin.
     orbit, hole_orbit : float
         Radius of the orbit of the rim's centre, and of the hole's, m.
     """
@@ -61,6 +61,7 @@ class Whirl:
     friction: float
     radius: float
     normal_force: float
+    friction_force: float
     orbit: float
     hole_orbit: float
 
@@ -156,8 +157,7 @@ class Balance:
         not decay, is left out. Rates below -10 times the whirl frequency are not resolved, and modes above 20
         times the highest whirl frequency searched are left out.
         """
-        w, rho, N = whirl.frequency, whirl.radius, whirl.normal_force
-        T = -rho * (1.0 / complex(self._receptance.at(w))).imag
+        w, rho, N, T = whirl.frequency, whirl.radius, whirl.normal_force, whirl.friction_force
         is_rolling = whirl.kind == ROLLING
         lateral, twist = self._slow, self._slow_twist if is_rolling else RIGID
         pole = np.concatenate([lateral.pole - 1j * w, twist.pole])
@@ -222,12 +222,14 @@ class Balance:
         value = self._receptance.at(w)
         inverse = float(self._inverse_radius(value))
         radius = 1.0 / inverse if inverse > 0.0 else math.inf
+        push = -radius / complex(value)
         return Whirl(
             frequency=w,
             kind=kind,
             friction=abs(self._ratio(w)),
             radius=radius,
-            normal_force=-radius * float((1.0 / value).real),
+            normal_force=push.real,
+            friction_force=push.imag,
             orbit=radius * float(abs(self._rotor.at(w) / value)),
             hole_orbit=radius * float(abs(self._hole.at(w) / value)),
         )
