@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from rubhpc.simulate import simulate
     from rubhpc.storage.summary import Summary
     from rubhpc.study.study import Study, read_study
+    from rubhpc.whirl_simulations import certify_whirl
 
 __all__ = [
     "Bore",
@@ -64,6 +65,7 @@ __all__ = [
     "Unbalance",
     "assemble",
     "branch",
+    "certify_whirl",
     "dry_whirl",
     "least_knock",
     "linear_design",
@@ -104,6 +106,7 @@ _HOMES = {
     "Unbalance": "rubhpc.rig.rotors:Unbalance",
     "assemble": "rubhpc.fem.assemble:assemble",
     "branch": "rubhpc.branch:branch",
+    "certify_whirl": "rubhpc.whirl_simulations:certify_whirl",
     "dry_whirl": "rubhpc.fem.dry_whirl:dry_whirl",
     "least_knock": "rubhpc.knocks:least_knock",
     "linear_design": "rubhpc.fem.linear_design:linear_design",

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from rubhpc.study.study import Study
 
 MOST_LISTED = 3  # speeds of a table; of more only the highest
+SIDES = ("slower", "faster")  # starts of the simulations of a whirl
 _WIDTHS = (6, 9, 8, 9, 11, 9, 10)
 _RPM = 30 / math.pi
 
@@ -36,6 +37,9 @@ _RPM = 30 / math.pi
     "--friction", "frictions", multiple=True, type=click.FloatRange(0.0), help="Coefficient; may be repeated."
 )
 @click.option("--frequency", metavar="LIMIT", help='Highest whirl frequency searched, "500 Hz", or "inf".')
+@click.option(
+    "--certify", is_flag=True, help="Simulate each whirl from both sides, and search for the least knock."
+)
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
 @click.option(
     "--figure", type=click.Path(dir_okay=False), help="Draw the chart over the speed, or the clearance."
@@ -49,6 +53,7 @@ def whirl(
     clearances: tuple[str, ...],
     frictions: tuple[float, ...],
     frequency: str | None,
+    certify: bool,
     as_json: bool,
     figure: str | None,
     data: str | None,
@@ -60,6 +65,10 @@ def whirl(
     without unbalance, over the speed; and with --friction all such whirls, slipping (whip) or rolling, with
     frequency, force and stability. A study gives speeds, clearances, frictions and the contact law, as far as
     no option does. A rig needs --clearance; its bores are hard unless they have a law of their own.
+
+    With --certify each whirl is simulated from a start that is slower and from one that is faster; and the
+    least knock is searched for that takes the whole machine to whirl. This takes seconds to minutes a whirl:
+    give few speeds.
     """
     import numpy as np
 
@@ -88,7 +97,13 @@ def whirl(
     if frequency is not None:
         limit = math.inf if frequency == "inf" else 2.0 * math.pi * quantity(frequency, "Hz", "--frequency")
         given["most_frequency"] = limit
+    if certify and not len(given.get("frictions", ())):
+        raise InputError("--certify: no friction is given; add --friction 0.2")
     found = whirls.dry_whirl(rig, **given)
+    if certify:
+        from rubhpc.whirl_simulations import certify_whirl
+
+        found = certify_whirl(rig, found, law=given.get("law"), report=_report)
     answer = whirls.in_words(found)
     if as_json:
         click.echo(json.dumps({"answer": answer} | _plain(found)))
@@ -173,8 +188,24 @@ def _print_table(found: xr.Dataset) -> None:
         kind = row["kind"]
         if dim == "whirl":
             kind += ", stable" if row["growth_rate"] < 0.0 else f", grows by {row['growth_rate']:.3g} 1/s"
+        if "is_confirmed" in row:
+            kind += f"; {'confirmed' if row['is_confirmed'] else 'not confirmed'}: {_ends(row)}"
         line = " ".join(f"{number:>{width}}" for number, width in zip(numbers, _WIDTHS, strict=True))
         click.echo(f"{line}  {kind}")
+
+
+def _ends(row: dict[str, Any]) -> str:
+    """Where the simulations of a whirl end."""
+    ends = [
+        f"{side} to {kind.replace('_', ' ')}"
+        + (f" {frequency / (2 * math.pi):.4f} Hz" if math.isfinite(frequency) else "")
+        for side, kind, frequency in zip(SIDES, row["reached_kind"], row["reached_frequency"], strict=True)
+    ]
+    return ", ".join(ends)
+
+
+def _report(n_done: int, n_all: int) -> None:
+    click.echo(f"{n_done}/{n_all} whirls and searches are done", err=True)
 
 
 def _rows(found: xr.Dataset, dim: str) -> list[dict[str, Any]]:
@@ -197,7 +228,7 @@ def _plain(found: xr.Dataset) -> dict[str, Any]:
     ]
     listed = {
         f"{dim}s": [{key: _number(value) for key, value in row.items()} for row in _rows(found, dim)]
-        for dim in ("threshold", "whirl")
+        for dim in ("threshold", "whirl", *(["knock"] if "knock" in found.dims else []))
     }
     return {
         "speed": found["speed"].values.tolist(),
@@ -209,4 +240,6 @@ def _plain(found: xr.Dataset) -> dict[str, Any]:
 
 
 def _number(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_number(one) for one in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -90,7 +90,8 @@ def dry_whirl(
         whirl: all whirls at each of the frictions. Both have columns `threshold_` and `whirl_`: `stator`,
         `speed` (rad/s), `clearance` (m), `friction` (of the case), `frequency` (rad/s, positive in the sense
         of positive spin), `kind` ("slipping" or "rolling"), `orbit` and `hole_orbit` (m, radii of the orbits
-        of both centres), `normal_force` and `friction_force` (N), `rim_speed` (m/s); `whirl_growth_rate` (1/s), negative where it is stable.
+        of both centres), `normal_force` and `friction_force` (N), `rim_speed` (m/s); and of whirl
+        `whirl_growth_rate` (1/s), negative where it is stable.
 
         Over point, at the highest speed and the first clearance: `curve_stator`, `curve_frequency` (rad/s)
         and `curve_friction` that a slipping whirl of this frequency needs.
@@ -202,7 +203,10 @@ def _sentences(found: xr.Dataset, i: int, span: str) -> str:
             text += f", and above {needed[first]:.3g} {_named(at, 'threshold', first)}"
         for mu in found.attrs["frictions"]:
             is_at = (found["whirl_stator"] == bore) & (found["whirl_friction"] == mu)
-            text += f". At {mu:g}: {_listed(found.isel(whirl=np.flatnonzero(is_at)))}"
+            some = found.isel(whirl=np.flatnonzero(is_at))
+            text += f". At {mu:g}: {_listed(some)}"
+            if "knock" in found.dims and some.sizes["whirl"]:
+                text += f"; {_certified(some, bore, mu)}"
     return text + (" (approximate)." if bool(found["is_approximate"][i].any()) else ".")
 
 
@@ -224,6 +228,19 @@ def _listed(found: xr.Dataset) -> str:
                 hertz, rpm = (_span(some[f"whirl_{of}"].values, write) for of, write in _SPANS.items())
                 parts.append(f"{state} {word} at {hertz}" + f", {rpm}" * (found.sizes["speed"] > 1))
     return "; ".join(parts) or "none"
+
+
+def _certified(found: xr.Dataset, bore: int, friction: float) -> str:
+    """What simulations say of the whirls of one bore and friction."""
+    n_sure, n_all = int(found["whirl_is_confirmed"].sum()), found.sizes["whirl"]
+    at = (found["knock_stator"].values == bore) & (found["knock_friction"].values == friction)
+    impulse = np.where(at, found["knock_impulse"].values, np.nan)
+    text = f"simulations confirm {n_sure} of {n_all}"
+    if np.isnan(impulse).all():
+        return f"{text}, and no knock up to {found['knock_harmless'].values[at].max():.3g} N s reaches whirl"
+    k = int(np.nanargmin(impulse))
+    knock = f"a knock of {impulse[k]:.3g} N s" if impulse[k] else "without a knock the machine"
+    return f"{text}, and {knock} reaches whirl at {_rpm(found['knock_speed'].values[k])}"
 
 
 def _span(values: Floats, write: Callable[[float], str]) -> str:
