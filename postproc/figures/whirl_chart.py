@@ -98,7 +98,6 @@ def _draw_friction(ax: Axes, found: xr.Dataset, i: int, along: str) -> None:
         ax.axhline(friction, color=f"C{k}", linewidth=0.7)
     ax.set(xlabel=label, ylabel="Friction needed", xlim=(x.min(), x.max()), ylim=(0.0, top))
     _name_ends(ax, names)
-    _write_none(ax, 0.5 * float(np.median(least)) / top)
 
 
 def _outline(x: Floats, least: Floats, top: float) -> tuple[Floats, Floats]:
@@ -139,7 +138,7 @@ def _draw_frequency(ax: Axes, found: xr.Dataset, i: int, along: str) -> None:
     ax.set(xlabel=label, ylabel="Whirl frequency (Hz)", xlim=(x.min() - room, x.max() + room))
     places, hertz = _places(some, dim, along), _hertz(some, dim)
     if not hertz.size:
-        _write_none(ax, 0.5)
+        _write_none(ax)
         ax.set_yticks([])
         return
     kind, clearance = some[f"{dim}_kind"].values, some[f"{dim}_clearance"].values
@@ -191,7 +190,7 @@ def _draw_curve(ax: Axes, found: xr.Dataset, i: int) -> None:
         room = 0.03 * float(np.ptp(ends))
         ax.set_xlim(min(ends) - room, max(ends) + room)
     else:
-        _write_none(ax, 0.5)
+        _write_none(ax)
 
 
 def _legend(ax: Axes, found: xr.Dataset, along: str | None) -> None:
@@ -251,10 +250,8 @@ def _branches(x: Floats, y: Floats, chosen: Ints, near: float = _NEAR) -> list[I
     return [np.array(line) for line in lines]
 
 
-def _write_none(ax: Axes, height: float) -> None:
-    """Write that nothing whirls, where there is room for it."""
-    if height > _ROOM:
-        ax.text(0.5, height, "no dry whirl", transform=ax.transAxes, ha="center", va="center", fontsize=7)
+def _write_none(ax: Axes) -> None:
+    ax.text(0.5, 0.5, "no dry whirl", transform=ax.transAxes, ha="center", va="center", fontsize=7)
 
 
 def _limits(found: xr.Dataset, needed: Floats) -> tuple[float, float]:

@@ -2,6 +2,9 @@
 
 import json
 import math
+import re
+import shlex
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -9,47 +12,8 @@ from click.testing import CliRunner
 from rubhpc.commands.whirl import whirl
 from rubhpc.errors import InputError
 
-RIG = """
-name = "pump"
-[[rotor.shaft]]
-length = "0.8 m"
-outer_diameter = "30 mm"
-elements = 4
-youngs_modulus = "210 GPa"
-shear_modulus = "80 GPa"
-density = 7800.0
-[[rotor.disc]]
-node = 3
-diameter = "0.2 m"
-thickness = "30 mm"
-density = 7800.0
-[[rotor.bearing]]
-node = 1
-stiffness = 2e7
-damping = 3e3
-[[rotor.bearing]]
-node = 5
-stiffness = 2e7
-damping = 3e3
-[[rotor.unbalance]]
-node = 3
-mass = "5 g"
-radius = "90 mm"
-[rotor.damping]
-alpha = 40.0
-[[stator]]
-kind = "bore"
-node = 3
-mass = "2 kg"
-stiffness = "4e6 N/m"
-damping = "400 N*s/m"
-[[stator]]
-kind = "bore"
-node = 5
-radius = "15 mm"
-rigid = true
-friction_factor = 0.5
-"""
+GUIDE = (Path(__file__).parents[2] / "docs" / "guide" / "dry_whirl.md").read_text(encoding="utf-8")
+RIG = re.search(r"```toml\n(.*?)```", GUIDE, re.DOTALL)[1]  # type: ignore[index]
 STUDY = """
 rig = "pump.toml"
 [grid]
@@ -81,7 +45,7 @@ def run(*arguments):
 def test_answer_gives_the_friction_up_to_a_speed_and_the_frequency_of_whirl(folder):
     document = json.loads(run("pump.toml", "--clearance", "0.2 mm", "--frequency", "200 Hz", "--json"))
     bore, other = document["bores"]
-    assert (bore["stator"], bore["node"], other["node"]) == (1, 3, 5)
+    assert (bore["stator"], bore["node"], other["node"]) == (1, 7, 6)
     assert set(document) == {
         "answer",
         "speed",
@@ -100,12 +64,18 @@ def test_answer_gives_the_friction_up_to_a_speed_and_the_frequency_of_whirl(fold
     top = 30 / math.pi * document["speed"][-1]
     hertz = abs(at["frequency"]) / (2 * math.pi)
     begin, _, end = document["answer"][0].partition("; ")
-    assert begin.startswith(f"Stator 1, node 3: no dry whirl below a friction of {least:.3g} up to ")
+    assert begin.startswith(f"Stator 1, node 7: no dry whirl below a friction of {least:.3g} up to ")
     speed, _, limit = begin.split(" up to ")[-1].partition(" rpm and ")
     assert float(speed) == pytest.approx(top, rel=1e-3)
     assert limit == "200 Hz"
     assert end.startswith(f"above it whip at {hertz:.3g} Hz")
     assert not document["whirls"]
+
+
+def test_the_guide_shows_what_is_printed(folder):
+    (given,) = re.findall(r"rubhpc whirl (pump.toml .*) --figure", GUIDE)
+    shown = re.search(r"```text\n(.*?)```", GUIDE, re.DOTALL)[1]  # type: ignore[index]
+    assert run(*shlex.split(given)).startswith(shown)
 
 
 def test_a_study_gives_speeds_clearances_friction_and_law(folder):
