@@ -28,6 +28,7 @@ from rubhpc.commands.report import report
 from rubhpc.errors import InputError
 from rubhpc.rig.reading import read_rig
 from rubhpc.rig.rig import Rig
+from rubhpc.rig.stators import Bore
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -335,3 +336,17 @@ def test_masses_have_no_euler_load() -> None:
     assert of_keys.isdisjoint(Measures(beams).names)
     strong = beams.assign_attrs(rig=beams.attrs["rig"] | {"stator": [mass | {"strength": 100.0}]})
     assert of_keys & set(Measures(strong).names) == {"force_over_strength"}
+
+
+def test_the_page_says_what_can_whirl_in_a_bore(synthetic_path: Path) -> None:
+    store = open_store(synthetic_path)
+    plain = Page(store).html(values={})
+    assert 'id="whirl"' not in plain, "no bore"
+    rig = read_rig("mokhtar2017")
+    bored = store.copy()
+    hole = Bore(node=8, mass=1.0, stiffness=1e6, damping=100.0)
+    bored.attrs = store.attrs | {"rig": replace(rig, stator=(hole,)).as_dict()}
+    text = Page(bored).html(values={})
+    assert 'href="#whirl"' in text
+    assert "Stator 1, node 8: no dry whirl" in text
+    assert text.count("data:image/png") == plain.count("data:image/png") + 1
