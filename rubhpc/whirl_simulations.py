@@ -83,9 +83,8 @@ def certify_whirl(
         Over knock, of each bore, speed, clearance and friction with whirl: `knock_stator`, `knock_speed`,
         `knock_clearance`, `knock_friction`, and `knock_impulse`, N s: the least knock at the bore's node that
         takes the whole machine, with its unbalance and loads, from its contact-free motion to lasting contact
-        that whirls in the predicted sense. 0 where it gets there without; NaN where no knock up to the
-        largest one tried does, or there is no contact-free motion. `knock_harmless`, N s: the largest below
-        it that did not.
+        that whirls in the predicted sense; 0 where it gets there without, NaN where no knock tried does.
+        `knock_harmless`, N s: the largest below it that did not.
     """
     contact = _contact(law or NormalLaw())
     whirls = [_row(found, k) for k in range(found.sizes["whirl"])]
@@ -224,15 +223,18 @@ def start_on(model: Model, whirl: dict[str, Any]) -> State:
         dynamic = body.stiffness + 1j * w * damping - w**2 * body.mass
         turning[part] = _response(dynamic, body, rows[:2], [sign * push, -1j * sign * push])
         twist[part] = _response(body.stiffness, body, rows[2:], [sign * torque]).real
-    at = turning.real
-    rows = [row + start for start, of in ((0, rim), (model.stator_start[i], hole)) for row in of[:2]]
-    held = [row >= 0 for row in (*rim[:2], *hole[:2])]
-    v, u, axial, lateral = (at[row] if free else 0.0 for row, free in zip(rows, held, strict=True))
+    at = turning.real + twist
+    at[: model.rotor.n_dof] += model.sag
+
+    def place(first: int, rows: Sequence[int]) -> complex:
+        """Where a centre is: up + i horizontally."""
+        return sum(at[first + row] * unit for row, unit in zip(rows, (1.0, 1j), strict=True) if row >= 0)
+
     force, overlap = np.zeros((2, len(model.stators)))
     force[i] = whirl["normal_force"]
-    radial = whirl["clearance"] + stator.clearance_offset
-    overlap[i] = max(0.0, math.hypot(v - axial, u - lateral) - radial)
-    return State.of_bodies(model, at + twist, (1j * w * turning).real, force, overlap)
+    apart = place(0, rim[:2]) - place(model.stator_start[i], hole[:2]) - complex(*stator.centre)
+    overlap[i] = max(0.0, abs(apart) - whirl["clearance"] - stator.clearance_offset)
+    return State.of_bodies(model, at, (1j * w * turning).real, force, overlap)
 
 
 def _response(
@@ -284,7 +286,9 @@ def _least_knock(
         )
         record = _run(setup, at, initial, transient, max(8.0, _RECORDED * turns))
         frequency = record.measures["whirl_frequency"][i]
-        return record.status == DONE and math.copysign(1.0, frequency) in senses and frequency == frequency
+        if record.status != DONE or math.isnan(frequency):
+            return False
+        return math.copysign(1.0, frequency) in senses
 
     directions = [Direction(2.0 * math.pi * k / angles, setup.model.stators[i].node) for k in range(angles)]
     if whirls_after(0.0, directions[0]):
