@@ -120,9 +120,8 @@ def assemble_carrier(
         relative = np.hstack([-mounting.shape[:, motions], np.eye(model.body.n_dof)])
         damping[met] += relative.T @ model.body.damping @ relative
         stiffness[met] += relative.T @ model.body.stiffness @ relative
-        slope: Floats | None = None
-        if model.squared_slope is not None:
-            slope = np.zeros_like(mass)
+        slope = None if model.squared_slope is None else np.zeros_like(mass)
+        if slope is not None:
             slope[met] = relative.T @ model.squared_slope @ relative
         slopes.append(slope)
         kept = [*motions, *range(3, 3 + model.body.n_dof)]
