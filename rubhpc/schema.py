@@ -106,6 +106,14 @@ _FLAGS = (
     Variable(name="status", role="flag", dtype="int8", long_name="state of the case", flags=STATUS),
     Variable(name="regime", role="flag", dtype="int8", long_name="regime of the motion", flags=REGIME),
 )
+_RUBS = (
+    _measure("rub_kind", "1", "rub in a bore (-1: another stator)", "stator", dtype="int8", flags=RUB_KIND),
+    _measure("whirl_frequency", "rad s-1", "whirl of the contact in a bore, positive forward", "stator"),
+    _measure("contact_angle_mean", "rad", "mean angle of the contact force in a bore, from up", "stator"),
+    _measure("contact_angle_spread", "rad", "angular deviation of that angle, to the root of two", "stator"),
+    _measure("contact_arc", "rad", "arc of a bore that is touched, to two pi", "stator"),
+)
+BORE_MEASURES = tuple(measure.name for measure in _RUBS)
 _MEASURES = (
     _measure("period", "1", "period in revolutions (0: none found)", dtype="int16"),
     _measure("lyapunov_exponent", "1", "largest Lyapunov exponent per revolution (NaN: not measured)"),
@@ -121,11 +129,7 @@ _MEASURES = (
     _measure("contact_impulse", "N s", "contact impulse per revolution", "stator"),
     _measure("friction_work", "J", "work of friction per revolution", "stator"),
     _measure("minimum_slip_speed", "m s-1", "lowest slip speed in contact", "stator", worst="min"),
-    _measure("rub_kind", "1", "rub in a bore (-1: another stator)", "stator", dtype="int8", flags=RUB_KIND),
-    _measure("whirl_frequency", "rad s-1", "whirl of the contact in a bore, positive forward", "stator"),
-    _measure("contact_angle_mean", "rad", "mean angle of the contact force in a bore, from up", "stator"),
-    _measure("contact_angle_spread", "rad", "angular deviation of that angle, to the root of two", "stator"),
-    _measure("contact_arc", "rad", "arc of a bore that is touched, to two pi", "stator"),
+    *_RUBS,
     _measure("force_over_euler_load", "1", "peak contact force over the stator's Euler load", "stator"),
     _measure("tip_deflection_ratio", "1", "peak lateral tip deflection over the stator's length", "stator"),
     _measure(

@@ -228,7 +228,8 @@ def start_on(model: Model, whirl: dict[str, Any]) -> State:
 
     def place(first: int, rows: Sequence[int]) -> complex:
         """Where a centre is: up + i horizontally."""
-        return sum(at[first + row] * unit for row, unit in zip(rows, (1.0, 1j), strict=True) if row >= 0)
+        parts = (at[first + row] * unit for row, unit in zip(rows, (1.0, 1j), strict=True) if row >= 0)
+        return complex(sum(parts))
 
     force, overlap = np.zeros((2, len(model.stators)))
     force[i] = whirl["normal_force"]

@@ -40,6 +40,8 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
+    from postproc.store.rig_of_case import Place
+
 _ASSETS = files("postproc.report") / "assets"
 _SCRIPTS = ("data.js", "chart.js", "map.js", "panels.js", "page.js")
 
@@ -144,7 +146,7 @@ class Page:
             "reasons": {str(i): text for i, text in store.attrs.get("reasons", {}).items()},
         }
 
-    def _places(self) -> list[tuple[float, ...]]:
+    def _places(self) -> list[Place]:
         try:
             return stator_places(self._store)
         except RubError:

@@ -136,10 +136,10 @@ def assemble_carrier(
     numbers = tuple(number for number, _, _ in stators)
     placed = []
     for of, slope, (_, _, model) in zip(rows, slopes, stators, strict=True):
-        tip = (of[model.axial], of[model.lateral]) if of else (body.index(1, "v"), body.index(1, "w"))
+        axial, lateral = (of[model.axial], of[model.lateral]) if of else (body.index(1, m) for m in "vw")
         turn = body.index(1, "thx") if model.is_bore else -1
-        seated = replace(model, body=body, alone=model, axial=tip[0], lateral=tip[1], torsion=turn)
-        placed.append(replace(seated, squared_slope=slope))
+        alone = replace(model, body=body, alone=model, squared_slope=slope)
+        placed.append(replace(alone, axial=axial, lateral=lateral, torsion=turn))
     return CarrierModel(name=carrier.name, body=body, stators=numbers), placed
 
 

@@ -121,7 +121,7 @@ CASES = {
     "two nodes": (two_nodes(), UPDATED | COULOMB),
     "bore": (bore(**SPRUNG), UPDATED | {"friction": 0.1}),
     "bore, coulomb": (bore(**SPRUNG, radius=2e-3), UPDATED | COULOMB),
-    "bore, rigid, restitution": (bore(rigid=True), UPDATED | COULOMB | {"restitution": 0.4, "friction": 0.1}),
+    "bore, restitution": (bore(**SPRUNG), UPDATED | COULOMB | {"restitution": 0.4, "friction": 0.1}),
     "bore, penalty": (bore(**SPRUNG, radius=5e-3), UPDATED | PENALTY | COULOMB | {"damping": 100.0}),
     "bore, hertz, gravity": (
         with_keys(bore(rigid=True, radius=3e-3), WEIGHT | {"stator.clearance_offset": "-60 um"}),

@@ -12,6 +12,7 @@ from rubhpc.errors import InputError
 from rubhpc.integrate.branches.events import Event, half_change, halving
 from rubhpc.integrate.branches.grazing import (
     closed_around,
+    filled,
     grazing,
     grazing_beside,
     grazing_between,
@@ -39,6 +40,7 @@ SHORT = 0.02  # length of a step that may pass a motion of half the period
 FEWEST = 6  # points of a closed branch
 ANYWHERE = 1e-3  # of a step, accuracy of where it ends
 SHORTEST = 1e-3  # length of a step in which several contacts may appear and vanish at once
+NEARBY = 1e-2  # length within which a branch is lost at a grazing
 BEYOND = (0.02, 0.1, 0.5)  # steps past a grazing at which the branch is sought again
 
 
@@ -125,7 +127,8 @@ def follow(
                     continue
                 if is_near and (length <= SHORT or not is_back):
                     events_between = passed(branching, base, trial, is_last=is_last)
-                    if events_between is not None or is_last:
+                    is_misled = _is_misled(branching, base, guess, trial, events_between or [])
+                    if (events_between is not None or is_last) and not is_misled:
                         found, happened = trial, events_between or []
                         break
                 length *= 0.5
@@ -212,12 +215,29 @@ def _is_near(branching: Branching, history: list[Point], guess: Floats, found: P
     return bool(moved > 0.0 and change @ guess > STRAIGHT * moved * length and moved < 2.0 * length)
 
 
+def _is_misled(
+    branching: Branching, base: Point, guess: Floats, trial: Point, happened: list[tuple[Event, Point]]
+) -> bool:
+    """Whether a grazing lies behind, where the branch has come from, or next to a motion that fills a bore.
+
+    On the wrong side of the grazing such a motion seems to be there, with forces within their error.
+    """
+    for event, point in happened:
+        if event is Event.GRAZING:
+            away = branching.difference(base, point)
+            is_behind = away.size == guess.size and away @ guess < 0.0
+            if is_behind or (filled(trial) and _is_close(branching, trial, point)):
+                return True
+    return False
+
+
 def _beyond(branching: Branching, history: list[Point], base: Point, grazing_point: Point) -> Point | None:
     """A motion with other contacts next to a grazing: by a weak impact, or along the parameter."""
 
     def follows(found: Point) -> bool:
-        is_near = np.linalg.norm(branching.difference(grazing_point, found)) < 1.0
-        return bool(touches(found) != touches(base) and is_near)
+        away = np.linalg.norm(branching.difference(grazing_point, found))
+        is_sure = away > NEARBY or not filled(found)
+        return bool(touches(found) != touches(base) and away < 1.0 and is_sure)
 
     with suppress(NotConverged):
         if follows(found := weakly_impacting(branching, history)):
@@ -235,8 +255,8 @@ def _beyond(branching: Branching, history: list[Point], base: Point, grazing_poi
 
 
 def _is_close(branching: Branching, base: Point, point: Point) -> bool:
-    """Whether a motion with other contacts is as near as a last short step."""
-    return bool(np.linalg.norm(branching.difference(base, point)) < SHORTEST)
+    """Whether a motion with other contacts is as near as some last short steps."""
+    return bool(np.linalg.norm(branching.difference(base, point)) < NEARBY)
 
 
 def _is_back(found: Point, base: Point) -> bool:
