@@ -207,9 +207,10 @@ def start_on(model: Model, whirl: dict[str, Any]) -> State:
         m.
     """
     i = int(whirl["stator"]) - 1
-    stator, w, spin = model.stators[i], whirl["frequency"], whirl["speed"]
-    push = whirl["normal_force"] + 1j * whirl["friction_force"]
-    torque = stator.radius * whirl["friction_force"]
+    stator, spin = model.stators[i], whirl["speed"]
+    sense = math.copysign(1.0, spin)
+    w, T = sense * whirl["frequency"], sense * whirl["friction_force"]
+    push, torque = whirl["normal_force"] + 1j * T, stator.radius * T
     turning = np.zeros(model.body_start[-1], dtype=complex)
     twist = np.zeros(len(turning))
     rim = [model.rotor.index(stator.node, name) for name in ("v", "w", "thx")]

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.model import Model, StatorModel
     from rubhpc.fem.receptance import Receptance
+    from rubhpc.fem.whirl_balance import Whirl
     from rubhpc.rig.rig import Rig
 
     Floats = NDArray[np.float64]
@@ -88,10 +89,10 @@ def dry_whirl(
 
         Over threshold: the whirl of least friction in each range of frequencies in which one can exist. Over
         whirl: all whirls at each of the frictions. Both have columns `threshold_` and `whirl_`: `stator`,
-        `speed` (rad/s), `clearance` (m), `friction` (of the case), `frequency` (rad/s, positive in the sense
-        of positive spin), `kind` ("slipping" or "rolling"), `orbit` and `hole_orbit` (m, radii of the orbits
-        of both centres), `normal_force` and `friction_force` (N), `rim_speed` (m/s); and of whirl
-        `whirl_growth_rate` (1/s), negative where it is stable.
+        `speed` (rad/s), `clearance` (m), `friction` (of the case), `frequency` (rad/s, positive forward, in
+        the sense of the spin), `kind` ("slipping" or "rolling"), `orbit` and `hole_orbit` (m, radii of the
+        orbits of both centres), `normal_force` and `friction_force` (N, positive against the spin),
+        `rim_speed` (m/s); and of whirl `whirl_growth_rate` (1/s), negative where it is stable.
 
         Over point, at the highest speed and the first clearance: `curve_stator`, `curve_frequency` (rad/s)
         and `curve_friction` that a slipping whirl of this frequency needs.
@@ -139,18 +140,18 @@ def dry_whirl(
                     parts[0].is_mean or parts[1].is_mean or _offset(turning, stator) > _OFFSET * radial
                 )
                 of = {"stator": bores[i] + 1, "speed": spin, "clearance": gap}
-                of["rim_speed"] = spin * stator.radius
+                of["rim_speed"] = abs(spin) * stator.radius
                 for whirl in balance.thresholds():
-                    thresholds.append(of | asdict(whirl) | {"friction": whirl.friction / factor})
+                    thresholds.append(of | _row(whirl, spin) | {"friction": whirl.friction / factor})
                     least[i, j, k] = np.fmin(least[i, j, k], whirl.friction / factor)
                 for mu in frictions:
                     whirls += [
-                        of | asdict(whirl) | {"friction": mu, "growth_rate": balance.growth_rate(whirl)}
+                        of | _row(whirl, spin) | {"friction": mu, "growth_rate": balance.growth_rate(whirl)}
                         for whirl in balance.whirls(mu * stator.friction_factor)
                     ]
                 if k == 0 and j == int(np.abs(spins).argmax()):
                     w, needed = balance.curve()
-                    curve.append([np.full(w.size, bores[i] + 1.0), w, needed / factor])
+                    curve.append([np.full(w.size, bores[i] + 1.0), _sense(spin) * w, needed / factor])
     along = ("stator", "speed", "clearance")
     found = xr.Dataset(
         {
@@ -212,9 +213,8 @@ def _sentences(found: xr.Dataset, i: int, span: str) -> str:
 
 def _named(found: xr.Dataset, dim: str, k: int) -> str:
     frequency = float(found[f"{dim}_frequency"][k])
-    is_forward = frequency * float(found[f"{dim}_speed"][k]) > 0.0
     word = NAMES[found[f"{dim}_kind"].values[k]]
-    return f"{'forward ' * is_forward}{word} at {_hertz(abs(frequency))}"
+    return f"{'forward ' * (frequency > 0.0)}{word} at {_hertz(abs(frequency))}"
 
 
 def _listed(found: xr.Dataset) -> str:
@@ -299,6 +299,16 @@ def _offset(model: Model, stator: StatorModel) -> float:
     """Distance of the shaft at rest from the centre of a bore, m."""
     at = sag_at(model.rotor, model.sag, stator.node)
     return math.hypot(at[0] - stator.centre[0], at[1] - stator.centre[1])
+
+
+def _row(whirl: Whirl, spin: float) -> Row:
+    """A whirl in the sense of the spin."""
+    turned = {name: _sense(spin) * getattr(whirl, name) for name in ("frequency", "friction_force")}
+    return asdict(whirl) | turned
+
+
+def _sense(spin: float) -> float:
+    return -1.0 if spin < 0.0 else 1.0
 
 
 def _add_columns(found: xr.Dataset, dim: str, rows: Sequence[Row]) -> None:

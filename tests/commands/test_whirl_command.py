@@ -73,9 +73,13 @@ def test_answer_gives_the_friction_up_to_a_speed_and_the_frequency_of_whirl(fold
 
 
 def test_the_guide_shows_what_is_printed(folder):
-    (given,) = re.findall(r"rubhpc whirl (pump.toml .*) --figure", GUIDE)
-    shown = re.search(r"```text\n(.*?)```", GUIDE, re.DOTALL)[1]  # type: ignore[index]
-    assert run(*shlex.split(given)).startswith(shown)
+    given = re.findall(r"rubhpc whirl (pump.toml .*)", GUIDE)
+    shown = re.findall(r"```text\n(.*?)```", GUIDE, re.DOTALL)
+    assert len(given) == len(shown) == 2
+    assert run(*shlex.split(given[0].partition(" --figure")[0])).startswith(shown[0])
+    certified = run(*shlex.split(given[1]))
+    assert shown[1] in certified
+    assert "confirmed: slower to none, faster to backward slipping" in certified
 
 
 def test_a_study_gives_speeds_clearances_friction_and_law(folder):
@@ -114,5 +118,7 @@ def test_what_is_missing_is_asked_for(folder):
         run("pump.toml")
     with pytest.raises(InputError, match="--range: conflicts with --speed"):
         run("pump.toml", "--clearance", "1e-4", "--speed", "1", "--range", "1", "2")
+    with pytest.raises(InputError, match="--certify: no friction is given"):
+        run("pump.toml", "--clearance", "1e-4", "--certify")
     with pytest.raises(InputError, match=r"rig mokhtar2017: has no bore"):
         run("mokhtar2017", "--clearance", "1e-4")
