@@ -196,12 +196,12 @@ def _sentences(found: xr.Dataset, i: int, span: str) -> str:
         text += f" {span}, whatever the friction"
     else:
         k = int(np.nanargmin(needed))
-        text += f" below a friction of {needed[k]:.3g} {span}; above it {_named(at, 'threshold', k)}"
+        text += f" below a friction of {needed[k]:.3g} {span}; above it {_named(at, k)}"
         size = np.abs(at["threshold_frequency"].values)
         slow = np.flatnonzero(size < 1.1 * size.min())  # the range of the lowest frequency, at all speeds
         first = int(slow[np.nanargmin(needed[slow])])
         if size[first] < 0.9 * size[k]:
-            text += f", and above {needed[first]:.3g} {_named(at, 'threshold', first)}"
+            text += f", and above {needed[first]:.3g} {_named(at, first)}"
         for mu in found.attrs["frictions"]:
             is_at = (found["whirl_stator"] == bore) & (found["whirl_friction"] == mu)
             some = found.isel(whirl=np.flatnonzero(is_at))
@@ -211,10 +211,12 @@ def _sentences(found: xr.Dataset, i: int, span: str) -> str:
     return text + (" (approximate)." if bool(found["is_approximate"][i].any()) else ".")
 
 
-def _named(found: xr.Dataset, dim: str, k: int) -> str:
-    frequency = float(found[f"{dim}_frequency"][k])
-    word = NAMES[found[f"{dim}_kind"].values[k]]
-    return f"{'forward ' * (frequency > 0.0)}{word} at {_hertz(abs(frequency))}"
+def _named(found: xr.Dataset, k: int) -> str:
+    """The whirl at a threshold."""
+    frequency = float(found["threshold_frequency"][k])
+    word = NAMES[found["threshold_kind"].values[k]]
+    last = ", the highest searched" * math.isclose(abs(frequency), found.attrs["most_frequency"])
+    return f"{'forward ' * (frequency > 0.0)}{word} at {_hertz(abs(frequency))}{last}"
 
 
 def _listed(found: xr.Dataset) -> str:
