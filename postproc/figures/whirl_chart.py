@@ -91,7 +91,7 @@ def _draw_friction(ax: Axes, found: xr.Dataset, i: int, along: str) -> None:
             ax.plot(places[branch], needed[branch], **_RANGE)
             end = branch[-1]
             if places[end] == x[-1] and needed[end] < top:
-                names.append((needed[end] / top, f"{hertz[end]:.3g} Hz"))
+                names.append((needed[end] / top, f"{float(f'{hertz[end]:.3g}'):g} Hz"))
     for k, line in enumerate(lines.T):
         ax.plot(x, np.where(np.isfinite(line), line, np.nan), color="k", linestyle=_DASHES[k % len(_DASHES)])
     for k, friction in enumerate(found.attrs["frictions"]):
