@@ -163,7 +163,7 @@ def _contact_frequency(parts: list[Part], degree: Ints, model: Model) -> float:
         response = along / square  # to a unit force, mode by mode
         inertia = (response @ response) / (along @ response) ** 2  # of that shape, as that of the first mode
         compliance = mode[axial] @ (mode[axial] / square)
-        if stator.alone is not None:  # an impact acts on the stator before the carrier moves
+        if stator.held.axial >= 0 and stator.alone is not None:  # it acts before the carrier moves
             tip = stator.alone.axial
             compliance = np.linalg.inv(stator.alone.body.stiffness)[tip, tip]
         highest = max(highest, 1.0 / np.sqrt(inertia * compliance))
