@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from rubhpc.branch import branch
     from rubhpc.errors import InputError, NoPeriodicMotion, RubError, StoppedEarly, StoreError
     from rubhpc.fem.assemble import assemble
+    from rubhpc.fem.dry_whirl import dry_whirl
     from rubhpc.fem.linear_design import linear_design
     from rubhpc.integrate.branches.branch import Branch
     from rubhpc.integrate.periodic_motion import PeriodicMotion
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from rubhpc.simulate import simulate
     from rubhpc.storage.summary import Summary
     from rubhpc.study.study import Study, read_study
+    from rubhpc.whirl_simulations import certify_whirl
 
 __all__ = [
     "Bore",
@@ -63,6 +65,8 @@ __all__ = [
     "Unbalance",
     "assemble",
     "branch",
+    "certify_whirl",
+    "dry_whirl",
     "least_knock",
     "linear_design",
     "measured",
@@ -102,6 +106,8 @@ _HOMES = {
     "Unbalance": "rubhpc.rig.rotors:Unbalance",
     "assemble": "rubhpc.fem.assemble:assemble",
     "branch": "rubhpc.branch:branch",
+    "certify_whirl": "rubhpc.whirl_simulations:certify_whirl",
+    "dry_whirl": "rubhpc.fem.dry_whirl:dry_whirl",
     "least_knock": "rubhpc.knocks:least_knock",
     "linear_design": "rubhpc.fem.linear_design:linear_design",
     "measured": "postproc.measured.measured:measured",
