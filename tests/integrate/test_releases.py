@@ -13,13 +13,16 @@ PACKAGED = read_rig("mokhtar2017")
 CATCHER = Bore(node=4, radius=0.02, mass=2.0, stiffness=5e6, damping=3000.0)
 CLEARANCE = 0.25e-3
 CASE = {"speed": "3000 rpm", "clearance": CLEARANCE, "friction": 0.05, "transient": 1}
-STIFF = {"rotor.shaft.youngs_modulus": "2100 GPa"}  # so that it falls as one
+STIFF = {
+    "rotor.shaft.youngs_modulus": "2100 GPa"
+}  # so that it falls as one, but for the bending that its bearings have caused
 
 
 def levitated(until="1 revolution", bores=(4, 12), **keys):
     table = PACKAGED.as_dict()
     table["rotor"]["bearing"] = [bearing | {"until": until} for bearing in table["rotor"]["bearing"]]
-    rig = replace(rig_from_dict(table | {"stator": [{"kind": "bore", "node": 1, "rigid": True, "radius": 1.0}]}))
+    any_bore = {"kind": "bore", "node": 1, "rigid": True, "radius": 1.0}
+    rig = rig_from_dict(table | {"stator": [any_bore]})
     rig = replace(rig, stator=tuple(replace(CATCHER, node=node) for node in bores))
     weight = {"rotor.gravity": 9.81, "rotor.clearance_from": "standstill", "rotor.unbalance.mass": 0.0}
     return with_keys(rig, STIFF | weight | keys)
@@ -44,21 +47,21 @@ def test_drop():
     n, interval = 1024, 0.02 / 1024
     assert np.ptp(record.vertical[:n]) < 1e-12
     first = np.flatnonzero(record.contact_force.any(axis=0))[0] - n
-    assert first * interval == pytest.approx(math.sqrt(2 * CLEARANCE / 9.81), rel=1e-2)
+    assert first * interval == pytest.approx(math.sqrt(2 * CLEARANCE / 9.81), rel=2e-2)
     fallen = record.vertical[n : n + first] - record.vertical[0]
     time = interval * np.arange(first)
-    assert fallen == pytest.approx(-0.5 * 9.81 * time**2, rel=0, abs=2e-2 * CLEARANCE)
+    assert fallen == pytest.approx(-0.5 * 9.81 * time**2, rel=0, abs=4e-2 * CLEARANCE)
     speed = (fallen[-1] - fallen[-101]) / (100 * interval) - 9.81 * 50 * interval
-    assert speed == pytest.approx(-math.sqrt(2 * 9.81 * CLEARANCE), rel=2e-2)
+    assert speed == pytest.approx(-math.sqrt(2 * 9.81 * CLEARANCE), rel=4e-2)
     assert abs(record.energy_residual) < 1e-4
 
 
 def test_it_comes_to_rest_at_the_bottom():
     rig = levitated(**{"rotor.damping.alpha": 31.7})
     record = simulate(rig, revolutions=60, **CASE | {"friction": 0.0})
-    weight = 9.81 * 3.665  # N
+    weight = 9.81 * (0.8 * math.pi * 0.01**2 * 7800 + 2.646)  # N, of shaft and disc
     bottom = record.contact_force_vertical[:, -256:].mean(axis=1)
-    assert bottom.sum() == pytest.approx(weight, rel=2e-2)
+    assert bottom.sum() == pytest.approx(weight, rel=5e-3)
     assert bottom[0] == pytest.approx(bottom[1], rel=0.05)
     assert abs(record.horizontal[-256:]).max() < 1e-9
 
