@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from rubhpc.errors import InputError, NoPeriodicMotion, RubError, StoppedEarly, StoreError
     from rubhpc.fem.assemble import assemble
     from rubhpc.fem.linear_design import linear_design
+    from rubhpc.identification.identify import Identification, identify
     from rubhpc.integrate.branches.branch import Branch
     from rubhpc.integrate.periodic_motion import PeriodicMotion
     from rubhpc.integrate.record import Record, State
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Branch",
     "Carrier",
+    "Identification",
     "InputError",
     "Load",
     "LumpedStator",
@@ -62,6 +64,7 @@ __all__ = [
     "Unbalance",
     "assemble",
     "branch",
+    "identify",
     "least_knock",
     "linear_design",
     "measured",
@@ -79,6 +82,7 @@ __all__ = [
 _HOMES = {
     "Branch": "rubhpc.integrate.branches.branch:Branch",
     "Carrier": "rubhpc.rig.carriers:Carrier",
+    "Identification": "rubhpc.identification.identify:Identification",
     "InputError": "rubhpc.errors:InputError",
     "Load": "rubhpc.rig.rotors:Load",
     "LumpedStator": "rubhpc.rig.stators:LumpedStator",
@@ -100,6 +104,7 @@ _HOMES = {
     "Unbalance": "rubhpc.rig.rotors:Unbalance",
     "assemble": "rubhpc.fem.assemble:assemble",
     "branch": "rubhpc.branch:branch",
+    "identify": "rubhpc.identification.identify:identify",
     "least_knock": "rubhpc.knocks:least_knock",
     "linear_design": "rubhpc.fem.linear_design:linear_design",
     "measured": "postproc.measured.measured:measured",

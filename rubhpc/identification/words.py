@@ -1,0 +1,148 @@
+"""What an identification has found, in words: what, where, how sure, and what the data cannot tell apart."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rubhpc.units import typed_quantity
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    import xarray as xr
+    from numpy.typing import NDArray
+
+    from rubhpc.identification.posterior import Found
+    from rubhpc.identification.priors import Prior
+
+    Floats = NDArray[np.float64]
+
+_SURE, _LIKELY = math.log(100.0), math.log(3.0)  # odds, after Jeffreys
+_BEYOND = math.log(1e6)
+_OPEN = 0.8  # of the spread of a prior, from which on a posterior says nothing
+_TIED = 0.9  # rank correlation of two quantities that are known together only
+_BAD = 4.0  # mean square of residuals over their standard deviation that no model should have
+_INTERVAL = (0.025, 0.5, 0.975)
+
+
+def in_words(found: Found, tree: xr.DataTree) -> Iterator[str]:
+    """Yield what is found, line by line."""
+    problem = found.problem
+    channels = problem.channels
+    signals = ", ".join(channels.names)
+    yield (
+        f"measured: {signals}; {channels.revolutions} revolutions at "
+        f"{typed_quantity(channels.spin, 'rad s-1')}; {problem.comparison.about}"
+    )
+    evidence = found.evidence
+    yield "ln(evidence): " + ", ".join(
+        f"{name} {value:.1f} +- {error:.1f}" for name, (value, error) in evidence.items()
+    )
+    best = max(evidence, key=lambda name: evidence[name][0])
+    yield _verdict(evidence, best)
+    misfit = _misfit(found, best)
+    if misfit > _BAD:
+        yield (
+            f"but it does not explain the record: residuals are {math.sqrt(misfit):.2g} times what noise and "
+            "discrepancy allow; something else is behind it, or the rig is not this one"
+        )
+    if best != problem.rub.name:
+        before, after = found.touching
+        yield f"contact has a probability of {after:.2g} in the study, and had {before:.2g} before"
+        return
+    yield from _contacts(found, tree)
+    yield from _values(found, tree)
+
+
+def _verdict(evidence: dict[str, tuple[float, float]], best: str) -> str:
+    """Which hypothesis holds, and how sure that is."""
+    value, error = evidence[best]
+    second = max((name for name in evidence if name != best), key=lambda name: evidence[name][0])
+    lead = value - evidence[second][0]
+    doubt = math.hypot(error, evidence[second][1])
+    if lead < max(_LIKELY, doubt):
+        return f"the data do not tell {best} from {second}"
+    odds = f"{math.exp(lead):.2g}" if lead < _BEYOND else "more than a million"
+    sure = "it is" if lead > _SURE else "it is probably"
+    return (
+        f"{sure} {_as_noun(best)}: odds of {odds} to 1 against {second}, if both were equally likely before"
+    )
+
+
+def _as_noun(name: str) -> str:
+    return {"rub": "a rub", "no rub": "not a rub"}.get(name, f"not a rub but {name}")
+
+
+def _misfit(found: Found, best: str) -> float:
+    """Mean square of the residuals of the likeliest case over what is allowed."""
+    comparison, rub = found.problem.comparison, found.problem.rub
+    if best == rub.name:
+        touching = [i for i, outcome in enumerate(found.outcomes) if outcome.touches]
+        i = max(touching, key=lambda k: float(found.rub.log_likelihoods[k]))
+        seen = found.outcomes[i].seen
+        assert seen is not None
+        return comparison.misfit(seen)
+    other = next(one for one in found.others if one.name == best)
+    sampled = found.others[other]
+    values = sampled.values[int(sampled.log_likelihoods.argmax())].tolist()
+    return comparison.misfit(comparison.of(other.waves(values)), other.unknown(values))
+
+
+def _contacts(found: Found, tree: xr.DataTree) -> Iterator[str]:
+    """Where it touches, and how hard."""
+    posterior = tree["posterior"].to_dataset()
+    for i, stator in enumerate(found.problem.machine.study.rig.stator):
+        one = posterior.isel(stator=i, chain=0)
+        share = one["contact_fraction"].values
+        touches = share > 0.0
+        if not touches.any():
+            yield f"stator {i + 1}: no contact"
+            continue
+        force, power = (one[name].values[touches] for name in ("peak_contact_force", "friction_power"))
+        yield (
+            f"stator {i + 1} at node {stator.node}: touches with a probability of {touches.mean():.2g}, for "
+            f"{100 * float(np.median(share[touches])):.2g} % of the time, with a peak force of "
+            f"{_interval(force, 'N')} and a friction power of {_interval(np.abs(power), 'W')}"
+        )
+
+
+def _interval(values: Floats, unit: str) -> str:
+    low, middle, high = np.quantile(values, _INTERVAL).tolist()
+    ends = f"{_short(low, unit)} to {_short(high, unit)}"
+    return f"{_short(middle, unit)} (95 %: {ends})"
+
+
+def _short(value: float, unit: str) -> str:
+    """A quantity to four digits."""
+    return typed_quantity(float(f"{value:.4g}"), unit)
+
+
+def _values(found: Found, tree: xr.DataTree) -> Iterator[str]:
+    """What is known of each quantity, and which are known together only."""
+    posterior = tree["posterior"].to_dataset().isel(chain=0)
+    priors = found.problem.rub.priors
+    draws = {prior.name: posterior[prior.axis.coordinate].values for prior in priors}
+    for prior in priors:
+        yield f"{prior.name} = {_interval(draws[prior.name], prior.axis.unit)}; {_before(prior)} before"
+    discrepancy = float(np.median(posterior["discrepancy"].values))
+    yield f"relative error of the model's lines, as the data show it: {100 * discrepancy:.2g} %"
+    unknown = [prior.name for prior in priors if np.std(draws[prior.name]) > _OPEN * prior.spread]
+    if unknown:
+        yield f"the data say next to nothing of {', '.join(unknown)}"
+    from scipy.stats import spearmanr
+
+    for first, second in itertools.combinations([p.name for p in priors if p.name not in unknown], 2):
+        if np.ptp(draws[first]) == 0.0 or np.ptp(draws[second]) == 0.0:
+            continue
+        tied = float(spearmanr(draws[first], draws[second]).statistic)
+        if abs(tied) > _TIED:
+            yield f"the data cannot tell {first} from {second} (rank correlation {tied:.2f})"
+
+
+def _before(prior: Prior) -> str:
+    low, high = prior.at(0.025), prior.at(0.975)
+    return f"{_short(low, prior.axis.unit)} to {_short(high, prior.axis.unit)}"
