@@ -28,7 +28,7 @@ def corner(tree: xr.DataTree) -> Drawing:
     tree : DataTree
         Of `rubhpc.identify`.
     """
-    posterior, prior = (tree[group].to_dataset().isel(chain=0) for group in ("posterior", "prior"))
+    posterior, prior = (tree[group].to_dataset().isel(chain=0, drop=True) for group in ("posterior", "prior"))
     names = [str(name) for name in prior.data_vars]
     shown = posterior[names]
 
@@ -47,6 +47,7 @@ def corner(tree: xr.DataTree) -> Drawing:
                     _pair(ax, x, y)
                 ax.tick_params(labelbottom=i == n - 1, labelleft=j == 0 and i > 0)
                 ax.locator_params(nbins=3)
+                ax.tick_params(axis="x", labelrotation=30.0)
                 if i == n - 1:
                     ax.set_xlabel(x_label)
                 if j == 0 and i > 0:
@@ -106,7 +107,7 @@ def predicted(tree: xr.DataTree) -> Drawing:
         Of `rubhpc.identify`.
     """
     observed = tree["observed_data"].to_dataset()
-    draws = tree["posterior_predictive"].to_dataset().isel(chain=0)
+    draws = tree["posterior_predictive"].to_dataset().isel(chain=0, drop=True)
     names = [
         str(name).removeprefix("spectrum_") for name in draws.data_vars if str(name).startswith("spectrum_")
     ]
@@ -152,4 +153,5 @@ def _orbit(ax: Axes, observed: xr.Dataset, draws: xr.Dataset) -> None:
         )
     v, w = (observed[name].values * scale.factor for name in ("vertical", "horizontal"))
     ax.plot(w, v, ".", color=_MEASURED, markersize=1.0)
-    ax.set(xlabel=scale.label("Horizontal"), ylabel=scale.label("Vertical"), aspect="equal")
+    ax.set(xlabel=scale.label("Horizontal"), ylabel=scale.label("Vertical"))
+    ax.set_aspect("equal", adjustable="datalim")

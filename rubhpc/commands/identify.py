@@ -46,9 +46,9 @@ def identify(
     """Find the rub behind a measured vibration, and how sure that is.
 
     Entries of [grid] in STUDY.toml are priors: { start, stop }, { mean, std }, or a list. DIR gets the
-    posterior as ArviZ InferenceData (posterior.nc), figures (corner.png, predicted.png), and the cases that have been
-    evaluated, from which the same command resumes after a stop. With --workers, or under mpirun, several
-    processes share the cases. Needs `pip install 'rubhpc[identify]'`.
+    posterior as ArviZ InferenceData (posterior.nc), figures (corner.png, predicted.png), and the cases that
+    have been evaluated, from which the same command resumes after a stop. With --workers, or under mpirun,
+    several processes share the cases. Needs `pip install 'rubhpc[identify]'`.
     """
     from postproc.figures.identified import corner, predicted
     from rubhpc.identification.evaluation import take_part

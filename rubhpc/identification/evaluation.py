@@ -11,6 +11,8 @@ import numpy as np
 from rubhpc.identification.candidates import Outcome
 from rubhpc.identification.evaluated import Evaluated
 from rubhpc.identification.priors import at_shares
+from rubhpc.running.ending import ended_together
+from rubhpc.running.pool import together
 from rubhpc.schema import FAILED
 from rubhpc.streams import lasting_streams
 from rubhpc.threads import on_one_thread
@@ -61,19 +63,15 @@ class Evaluator:
         like = task.rub.comparison.measured
         self.evaluated = Evaluated(task.folder, task.content, like, n_value, n_stator, task.rank)
         self._nothing = np.full(n_stator, math.nan)
-        self.n_computed = 0
-        self.problem = ""  # of the last case that failed
 
     def outcome(self, values: Floats) -> Outcome:
         """Return the outcome of a case, known or computed."""
         known = self.evaluated.of(values)
         if known is not None:
             return known
-        self.n_computed += 1
         try:
             found = self.rub.outcome(values.tolist())
-        except Exception as error:  # as in a study, where such a case is marked as failed
-            self.problem = f"{type(error).__name__}: {error}"
+        except Exception:  # as in a study, where such a case is marked as failed
             found = Outcome(FAILED, None, self._nothing, self._nothing, self._nothing)
         self.evaluated.keep(values, found)
         return found
@@ -99,16 +97,12 @@ def current_values(shares: Floats) -> Floats:
     return at_shares(evaluator().rub.priors, shares)
 
 
-def problems(_: object) -> tuple[int, str]:
-    """Return how many cases this process has computed, and why the last one that failed did."""
-    return evaluator().n_computed, evaluator().problem
-
-
 class Shared:
     """Maps functions over the processes of a pool, in the order of the items."""
 
     def __init__(self, pool: Pool) -> None:
         self._pool = pool
+        self._is_met = True  # whether the others wait for more
         self.size = pool.size
 
     def use(self, task: Task) -> None:
@@ -118,17 +112,21 @@ class Shared:
     def map(self, function: Callable[[Any], T], items: Iterable[Any]) -> list[T]:
         """Return the values of a function of a module."""
         listed = list(items)
-        parts = _share(self._pool, self._pool.from_first(lambda: (function, listed)))
+        work = self._pool.from_first(lambda: (function, listed))
+        self._is_met = False
+        parts = _share(self._pool, work)
+        self._is_met = True
         return [parts[i % self._pool.size][i // self._pool.size] for i in range(len(listed))]
 
     def close(self) -> None:
-        """Let the others go."""
-        self._pool.from_first(lambda: None)
+        """Let the others go, if what was raised has not ended them too."""
+        if self._is_met:
+            self._pool.from_first(lambda: None)
 
 
 def _share(pool: Pool, work: tuple[Callable[[Any], Any], list[Any]]) -> list[list[Any]]:
     function, items = work
-    return pool.gather([function(item) for item in items[pool.rank :: pool.size]])
+    return together(pool, lambda: [function(item) for item in items[pool.rank :: pool.size]])
 
 
 @on_one_thread
@@ -139,5 +137,6 @@ def take_part(pool: Pool, stopping: Stopping | None = None) -> None:
     def unknown() -> Any:
         raise AssertionError("a worker is not the first rank")
 
-    while (work := pool.from_first(unknown)) is not None:
-        _share(pool, work)
+    with ended_together(pool):
+        while (work := pool.from_first(unknown)) is not None:
+            _share(pool, work)

@@ -22,7 +22,7 @@ from rubhpc.identification.posterior import Found, tree_of
 from rubhpc.identification.priors import at_shares
 from rubhpc.identification.problem import read_problem
 from rubhpc.identification.words import in_words
-from rubhpc.running.ending import crash, ended_together
+from rubhpc.running.ending import ended_together
 from rubhpc.running.pool import Pool
 from rubhpc.running.workers import start_workers
 from rubhpc.streams import lasting_streams
@@ -137,13 +137,12 @@ def identify_on(
     with ended_together(pool):
         shared = Shared(pool)
         try:
-            return _identify(shared, read(), output, live, draws, seed, report)
+            found = _identify(shared, read(), output, live, draws, seed, report)
         except RubError:
-            raise
-        except Exception as error:
-            raise crash(error) from error
-        finally:
             shared.close()
+            raise
+        shared.close()
+        return found
 
 
 def _identify(

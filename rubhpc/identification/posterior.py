@@ -149,6 +149,7 @@ def _observed(problem: Problem) -> xr.Dataset:
     whole = channels.revolutions // _SHOWN
     waves = channels.waves[:, : whole * _SHOWN * channels.n]
     mean = waves.reshape(len(channels.names), whole, -1).mean(axis=1)
+    mean -= mean.mean(axis=1, keepdims=True)
     for i, name in enumerate(channels.names):
         about = {"units": channels.units[i], "long_name": channels.long_names[i]}
         found[f"spectrum_{name}"] = "order", amplitude[i], about
