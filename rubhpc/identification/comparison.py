@@ -90,16 +90,23 @@ def wanted_orders(orders: Floats, natural: Sequence[float], highest: float) -> N
 
 
 def period_of_lines(channels: Channels) -> int:
-    """Return in how many revolutions the measured motion repeats a whole number of times; 0: in none."""
+    """Return in how many revolutions the measured motion repeats a whole number of times; 0: in none.
+
+    White noise does not count, nor does what one channel alone shows, such as a torsional encoder of a shaft
+    without torsional vibration.
+    """
     for period in _PERIODS:
         whole = channels.revolutions // period * period
         if channels.revolutions < _FEWEST * period:
             continue
         power = np.abs(lines_of(channels.waves, channels.n, whole)) ** 2
+        first, last = (math.floor(share * channels.highest_order * whole) for share in (0.75, 1.0))
+        white = np.median(power[:, first:last], axis=1) / math.log(2.0)  # of exponential variates: the mean
         low = power[:, 1 : math.ceil(WHOLE * whole)]
-        on = low[:, whole // period - 1 :: whole // period]
-        off = 1.0 - on.sum(axis=1) / np.maximum(low.sum(axis=1), np.finfo(float).tiny)
-        if float(off.mean()) < _BROAD:
+        is_between = np.ones(low.shape[1], dtype=bool)
+        is_between[whole // period - 1 :: whole // period] = False
+        excess = low[:, is_between].sum(axis=1) - white * is_between.sum()
+        if float((excess / np.maximum(low.sum(axis=1), np.finfo(float).tiny)).min()) < _BROAD:
             return period
     return 0
 
