@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from postproc.signals.resampling import between
 from postproc.signals.spectra import samples_per_revolution
 from postproc.store.attributes import MEASURED
 from rubhpc.errors import InputError
@@ -25,6 +26,9 @@ _BAND = 0.4  # of the sampling rate: beyond, the filter of the logger has taken 
 _FEWEST = 24  # revolutions
 _MOVED = "measured_"  # what probes at the node of a measured orbit are called
 _ANGLES = {"vertical": 0.0, "horizontal": 0.5 * math.pi}
+_SLIP = 0.02  # by which a speed that is given may be wrong
+_HARMONICS = 4  # by which the true speed is found
+_TRIALS = 20  # a bin of the spectrum
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,6 +123,11 @@ def channels_of(measured: xr.Dataset) -> Channels:
         problem = f"has {revolutions} revolutions, fewer than {_FEWEST}"
         raise InputError(f"{where}: {problem}; give a longer record")
     spin = float(measured["spin_speed"])
+    is_absolute = bool(measured.attrs.get("has_absolute_phase", 0))
+    waves = np.stack([measured[name].values.astype(float) for name in names])
+    if not is_absolute:  # the speed may be a nominal one
+        slip = _slip(waves, n)
+        spin, waves = spin * slip, _turned_by(waves, n, slip)
     seen = _BAND * min(float(measured.attrs.get("rate", math.inf)) * 2.0 * math.pi / spin, n)
     return Channels(
         names=tuple(names),
@@ -126,9 +135,40 @@ def channels_of(measured: xr.Dataset) -> Channels:
         units=tuple(str(measured[name].attrs.get("units", "1")) for name in names),
         long_names=tuple(str(measured[name].attrs.get("long_name", name)) for name in names),
         probes=tuple(probes),
-        waves=np.stack([measured[name].values.astype(float) for name in names]),
+        waves=waves,
         n=n,
         spin=spin,
         highest_order=seen,
-        is_absolute=bool(measured.attrs.get("has_absolute_phase", 0)),
+        is_absolute=is_absolute,
     )
+
+
+def _slip(waves: Floats, n: int) -> float:
+    """Return the true speed over the one by which signals were resampled: where the lines at 1X to 4X stand."""
+    size = np.maximum(waves.std(axis=1, keepdims=True), np.finfo(float).tiny)
+    whole = waves / size * np.hanning(waves.shape[1])
+    revolutions = waves.shape[1] / n
+    turns = np.arange(waves.shape[1]) / n
+
+    def power(slip: float, orders: range) -> float:
+        wheel = np.exp(-2j * math.pi * slip * turns)
+        return float(sum((np.abs(whole @ wheel**order) ** 2).sum() for order in orders))
+
+    def best(around: float, reach: float, orders: range) -> float:
+        trials = around + np.linspace(-reach, reach, 2 * max(1, math.ceil(reach * revolutions * _TRIALS)) + 1)
+        return float(max(trials, key=lambda slip: power(slip, orders)))
+
+    bin_width = 1.0 / revolutions
+    first = best(1.0, _SLIP, range(1, 2))
+    near = best(first, 0.5 * bin_width, range(1, _HARMONICS + 1))
+    step = bin_width / _TRIALS
+    low, middle, high = (power(near + i * step, range(1, _HARMONICS + 1)) for i in (-1, 0, 1))
+    bend = low - 2.0 * middle + high
+    return near if bend >= 0.0 else near + 0.5 * step * (low - high) / bend
+
+
+def _turned_by(waves: Floats, n: int, slip: float) -> Floats:
+    """Return signals over the true angle of the shaft, whole revolutions of them."""
+    size = math.floor((waves.shape[1] - 1) * slip / n) * n
+    at = np.arange(size) / slip
+    return np.stack([between(wave)(at) for wave in waves])

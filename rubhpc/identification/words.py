@@ -27,6 +27,7 @@ _OPEN = 0.8  # of the spread of a prior, from which on a posterior says nothing
 _TIED = 0.9  # rank correlation of two quantities that are known together only
 _BAD = 4.0  # mean square of residuals over their standard deviation that no model should have
 _INTERVAL = (0.025, 0.5, 0.975)
+_BEFORE = ", if both were equally likely before"
 
 
 def in_words(found: Found, tree: xr.DataTree) -> Iterator[str]:
@@ -43,7 +44,7 @@ def in_words(found: Found, tree: xr.DataTree) -> Iterator[str]:
         f"{name} {value:.1f} +- {error:.1f}" for name, (value, error) in evidence.items()
     )
     best = max(evidence, key=lambda name: evidence[name][0])
-    yield _verdict(evidence, best)
+    yield from _verdict(evidence, problem.rub.name)
     misfit = _misfit(found, best)
     if misfit > _BAD:
         yield (
@@ -52,29 +53,38 @@ def in_words(found: Found, tree: xr.DataTree) -> Iterator[str]:
         )
     if best != problem.rub.name:
         before, after = found.touching
-        yield f"contact has a probability of {after:.2g} in the study, and had {before:.2g} before"
+        if before < 1.0:
+            yield f"of the cases of [grid] a share of {before:.2g} touches, of those that fit {after:.2g}"
         return
     yield from _contacts(found, tree)
     yield from _values(found, tree)
 
 
-def _verdict(evidence: dict[str, tuple[float, float]], best: str) -> str:
-    """Which hypothesis holds, and how sure that is."""
-    value, error = evidence[best]
-    second = max((name for name in evidence if name != best), key=lambda name: evidence[name][0])
-    lead = value - evidence[second][0]
-    doubt = math.hypot(error, evidence[second][1])
-    if lead < max(_LIKELY, doubt):
-        return f"the data do not tell {best} from {second}"
-    odds = f"{math.exp(lead):.2g}" if lead < _BEYOND else "more than a million"
-    sure = "it is" if lead > _SURE else "it is probably"
-    return (
-        f"{sure} {_as_noun(best)}: odds of {odds} to 1 against {second}, if both were equally likely before"
-    )
+def _verdict(evidence: dict[str, tuple[float, float]], rub: str) -> Iterator[str]:
+    """Whether it is a rub, which of the others it is if not, and how sure that is."""
+    others = sorted((name for name in evidence if name != rub), key=lambda name: -evidence[name][0])
+    lead, odds, sure = _odds(evidence, rub, others[0])
+    if not odds:
+        yield f"the data do not tell a rub from {others[0]}"
+    elif lead > 0.0:
+        yield f"it is {sure}a rub: {odds} against {others[0]}{_BEFORE}"
+    else:
+        yield f"it is {sure}not a rub: {odds} against one{_BEFORE}"
+        _, odds, sure = _odds(evidence, others[0], others[1])
+        if odds:
+            yield f"it is {sure}{others[0]}: {odds} against {others[1]}"
+        else:
+            yield f"the data do not tell {others[0]} from {others[1]}"
 
 
-def _as_noun(name: str) -> str:
-    return {"rub": "a rub", "no rub": "not a rub"}.get(name, f"not a rub but {name}")
+def _odds(evidence: dict[str, tuple[float, float]], one: str, other: str) -> tuple[float, str, str]:
+    """Lead of one over the other, the odds of the better one, "" where they say nothing, and how sure it is."""
+    lead = evidence[one][0] - evidence[other][0]
+    size, doubt = abs(lead), math.hypot(evidence[one][1], evidence[other][1])
+    if size < max(_LIKELY, doubt):
+        return lead, "", ""
+    odds = f"odds of {math.exp(size):.2g} to 1" if size < _BEYOND else "odds of more than a million to 1"
+    return lead, odds, "" if size > max(_SURE, doubt) else "probably "
 
 
 def _misfit(found: Found, best: str) -> float:
