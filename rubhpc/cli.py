@@ -48,6 +48,10 @@ COMMANDS = {
         "rubhpc.commands.identify:identify",
         "The rub behind a measured vibration, as a posterior.",
     ),
+    "calibrate": (
+        "rubhpc.commands.calibrate:calibrate",
+        "Whether identification is right as often as it says.",
+    ),
     "claims": ("rubhpc.commands.claims:claims", "The paper's claims against the stores of jobs/paper."),
 }
 

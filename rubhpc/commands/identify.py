@@ -6,9 +6,6 @@ from pathlib import Path
 
 import click
 
-from rubhpc.errors import InputError
-from rubhpc.running.launch import launch
-
 
 @click.command()
 @click.argument("measured", metavar="MEASURED.toml", type=click.Path(path_type=Path))
@@ -51,45 +48,25 @@ def identify(
     several processes share the cases. Needs `pip install 'rubhpc[identify]'`.
     """
     from postproc.figures.identified import corner, predicted
-    from rubhpc.identification.evaluation import take_part
-    from rubhpc.identification.identify import identify as identify_here
+    from rubhpc.identification.evaluation import processes, take_part
     from rubhpc.identification.identify import identify_on
     from rubhpc.identification.problem import read_problem
-    from rubhpc.running.pool import connect
     from rubhpc.running.progress import one_line
 
     folder = output or Path(f"{measured.stem}_identified")
-    with one_line() as say:
-        if launch().size > 1:
-            if workers > 1:
-                raise InputError(
-                    "--workers: mpirun has started several processes already; use one of the two"
-                )
-            pool = connect()
-            if pool.rank > 0:
-                take_part(pool)
-                return 0
-            found = identify_on(
-                pool,
-                lambda: read_problem(measured, study, trust_rig=trust_rig),
-                output=folder,
-                live=live,
-                draws=draws,
-                seed=seed,
-                report=say,
-            )
-        else:
-            found = identify_here(
-                measured,
-                study,
-                output=folder,
-                live=live,
-                draws=draws,
-                seed=seed,
-                workers=workers,
-                trust_rig=trust_rig,
-                report=say,
-            )
+    with one_line() as say, processes(workers) as pool:
+        if pool.rank > 0:
+            take_part(pool)
+            return 0
+        found = identify_on(
+            pool,
+            lambda: read_problem(measured, study, trust_rig=trust_rig),
+            output=folder,
+            live=live,
+            draws=draws,
+            seed=seed,
+            report=say,
+        )
     for line in found.lines:
         click.echo(line)
     for name, drawing in (("corner", corner(found.tree)), ("predicted", predicted(found.tree))):

@@ -63,6 +63,59 @@ class Outcome(NamedTuple):
         return bool((self.contact_fraction > 0.0).any())
 
 
+def settings_of(study: Study, priors: Sequence[Prior], values: Sequence[float]) -> dict[str, float | str]:
+    """Return all keys of [grid] of a study of one case, by name, with these values of the open ones."""
+    known = {axis.name: (axis.words or axis.values)[0] for axis in study.axes}
+    pairs = zip(priors, values, strict=True)
+    return known | {prior.name: prior.as_given(float(value)) for prior, value in pairs}
+
+
+def simulated(
+    study: Study,
+    tables: Mapping[str, Mapping[str, Any]],
+    settings: Mapping[str, float | str],
+    samples_per_revolution: int,
+) -> Record:
+    """Return the record of a case of a study.
+
+    Parameters
+    ----------
+    study : Study
+        Its rig and record.
+    tables : mapping
+        [contact], [integrator] and [initial] as in the file.
+    settings : mapping
+        All keys of [grid].
+    samples_per_revolution : int
+    """
+    given: dict[str, Any] = {**tables["contact"], **tables["integrator"]}
+    overrides, start = {}, dict(tables["initial"])
+    for name, value in settings.items():
+        if name in OWN:
+            given[name] = value
+        elif name.startswith(contact_axes.PREFIX):
+            given[name.removeprefix(contact_axes.PREFIX)] = value
+        elif name.startswith(initial.PREFIX):
+            start[name.removeprefix(initial.PREFIX)] = value
+        else:
+            overrides[name] = value
+    case = case_of(
+        "identify",
+        study.rig,
+        {**given, "overrides": overrides},  # type: ignore[typeddict-item]
+        samples_per_revolution=samples_per_revolution,
+        initial=start or None,
+        probes=study.recording.probe,
+    )
+    return run_case(
+        case.setup,
+        clearance=case.clearance,
+        friction=case.friction,
+        recording=study.recording,
+        initial=case.initial,
+    )
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Machine:
     """The machine of a study, with keys that are yet to be set.
@@ -85,38 +138,11 @@ class Machine:
 
     def settings(self, values: Sequence[float]) -> dict[str, float | str]:
         """Return all keys of [grid], by name."""
-        known = {axis.name: (axis.words or axis.values)[0] for axis in self.study.axes}
-        pairs = zip(self.priors, values, strict=True)
-        return known | {prior.name: prior.as_given(float(value)) for prior, value in pairs}
+        return settings_of(self.study, self.priors, values)
 
     def simulate(self, values: Sequence[float]) -> Record:
         """Return the record of a case with these values of the open keys."""
-        given: dict[str, Any] = {**self.tables["contact"], **self.tables["integrator"]}
-        overrides, start = {}, dict(self.tables["initial"])
-        for name, value in self.settings(values).items():
-            if name in OWN:
-                given[name] = value
-            elif name.startswith(contact_axes.PREFIX):
-                given[name.removeprefix(contact_axes.PREFIX)] = value
-            elif name.startswith(initial.PREFIX):
-                start[name.removeprefix(initial.PREFIX)] = value
-            else:
-                overrides[name] = value
-        case = case_of(
-            "identify",
-            self.study.rig,
-            {**given, "overrides": overrides},  # type: ignore[typeddict-item]
-            samples_per_revolution=self.channels.n,
-            initial=start or None,
-            probes=self.study.recording.probe,
-        )
-        return run_case(
-            case.setup,
-            clearance=case.clearance,
-            friction=case.friction,
-            recording=self.study.recording,
-            initial=case.initial,
-        )
+        return simulated(self.study, self.tables, self.settings(values), self.channels.n)
 
     def model(self, values: Sequence[float]) -> tuple[Model, float]:
         """Return the model of a case at its spin, with probes, and the spin, rad/s."""
@@ -194,7 +220,7 @@ class Rub:
 
     def seen(self, record: Record) -> Seen:
         """Return the features of a record."""
-        return self.comparison.of(self.machine.channels.of_record(record.signals))
+        return self.comparison.of(self.machine.channels.of_record(record.signals)).in_order()
 
     def log_likelihood(self, outcome: Outcome) -> float:
         """Return the logarithm of the likelihood; a case that fails is impossible."""

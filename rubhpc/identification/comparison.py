@@ -33,6 +33,10 @@ class Seen(NamedTuple):
     values: NDArray[Any]  # complex, or real
     variance: Floats
 
+    def in_order(self) -> Seen:
+        """Return copies that lie in memory row by row, on which the rounding of sums depends."""
+        return Seen(*(np.array(array, order="C") for array in self))
+
 
 class Unknown(NamedTuple):
     """Forces of unknown size and phase at an order, of which a linear machine makes lines."""

@@ -65,7 +65,7 @@ class Evaluated:
                 if zlib.crc32(entry).to_bytes(4, "little") != check:
                     break
                 row: Any = np.frombuffer(entry, self._type)[0]
-                seen = Seen(row["values"], row["variance"])
+                seen = Seen(row["values"], row["variance"]).in_order()
                 status = int(row["status"])
                 has_seen = bool(np.isfinite(row["variance"]).all())
                 self._found[row["key"].tobytes()] = Outcome(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -12,13 +13,15 @@ from rubhpc.identification.candidates import Outcome
 from rubhpc.identification.evaluated import Evaluated
 from rubhpc.identification.priors import at_shares
 from rubhpc.running.ending import ended_together
-from rubhpc.running.pool import together
+from rubhpc.running.pool import connect, together
+from rubhpc.running.workers import start_workers
 from rubhpc.schema import FAILED
 from rubhpc.streams import lasting_streams
 from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
+    from contextlib import AbstractContextManager
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -122,6 +125,19 @@ class Shared:
         """Let the others go, if what was raised has not ended them too."""
         if self._is_met:
             self._pool.from_first(lambda: None)
+
+
+def processes(workers: int) -> AbstractContextManager[Pool]:
+    """Return the processes of this run: the ranks of a launcher, or so many workers, of which the first is this.
+
+    Raises
+    ------
+    InputError
+        A launcher has started several, and there are to be workers too.
+    """
+    if workers > 1:
+        return start_workers(workers, take_part)
+    return nullcontext(connect())
 
 
 def _share(pool: Pool, work: tuple[Callable[[Any], Any], list[Any]]) -> list[list[Any]]:

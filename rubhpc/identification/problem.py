@@ -6,7 +6,7 @@ import json
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import xarray as xr
 
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from os import PathLike
 
     from rubhpc.identification.channels import Channels
+    from rubhpc.identification.priors import Prior
     from rubhpc.rig.rig import Rig
     from rubhpc.study.study import Study
 
@@ -89,6 +90,47 @@ class Problem:
         return json.dumps(table, sort_keys=True, default=str)
 
 
+class Known(NamedTuple):
+    """What a study says of a machine before the measurement."""
+
+    name: str  # of the file
+    table: dict[str, Any]  # the file
+    rig: Rig
+    priors: tuple[Prior, ...]
+    at_medians: dict[str, Any]  # [grid] with the medians of the open keys
+
+    @property
+    def tables(self) -> dict[str, dict[str, Any]]:
+        """Tables of the laws, schemes and starts."""
+        return {key: table_of(self.table, key, self.name) for key in ("contact", "integrator", "initial")}
+
+
+def read_known(study: str | PathLike[str], *, trust_rig: bool = False) -> Known:
+    """Return what a study file says of a machine before the measurement.
+
+    Raises
+    ------
+    InputError
+        Nothing is open, or the study cannot be identified.
+    """
+    source = Path(study)
+    table, name = read_toml(source), str(study)
+    for key, reason in _REFUSED.items():
+        if key in table:
+            raise InputError(f"{place(name, key)}: {reason}; remove [{key}]")
+    rig = read_rig(
+        line_of_text(table, "rig", "", name), source.parent, place(name, "", "rig"), trust_rig=trust_rig
+    )
+    rig = overridden(rig, table_of(table, "override", name), name)
+    grid = dict(flatten(table_of(table, "grid", name)))
+    priors = tuple(read_prior(key, value, rig, name) for key, value in grid.items() if is_prior(value))
+    if not priors:
+        fix = "write a quantity as { start, stop } or { mean, std }"
+        raise InputError(f"{place(name, 'grid')}: nothing is open; {fix}")
+    at_medians = grid | {prior.name: prior.as_given(prior.at(0.5)) for prior in priors}
+    return Known(name, table, rig, priors, at_medians)
+
+
 def read_problem(
     file: str | PathLike[str] | xr.Dataset, study: str | PathLike[str], *, trust_rig: bool = False
 ) -> Problem:
@@ -107,29 +149,17 @@ def read_problem(
     InputError
         A file cannot be read or used; its text says what to do.
     """
-    source = Path(study)
-    table, name = read_toml(source), str(study)
-    for key, reason in _REFUSED.items():
-        if key in table:
-            raise InputError(f"{place(name, key)}: {reason}; remove [{key}]")
+    known = read_known(study, trust_rig=trust_rig)
     data = file if isinstance(file, xr.Dataset) else measured(file)
     channels = channels_of(data)
-    rig = read_rig(
-        line_of_text(table, "rig", "", name), source.parent, place(name, "", "rig"), trust_rig=trust_rig
-    )
-    rig = overridden(rig, table_of(table, "override", name), name)
-    grid = dict(flatten(table_of(table, "grid", name)))
-    priors = tuple(read_prior(key, value, rig, name) for key, value in grid.items() if is_prior(value))
-    if not priors:
-        fix = "write a quantity as { start, stop } or { mean, std }"
-        raise InputError(f"{place(name, 'grid')}: nothing is open; {fix}")
-    at_medians = grid | {prior.name: prior.as_given(prior.at(0.5)) for prior in priors}
-    if not set(SPEED_AXES) & set(grid):
+    table, rig = known.table, known.rig
+    at_medians = known.at_medians
+    if not set(SPEED_AXES) & set(at_medians):
         at_medians = {"speed": channels.spin} | at_medians
     period = period_of_lines(channels)
     comparison = _comparison(channels, period, _natural_orders(rig, channels))
     length = {"transient": "direct", "revolutions": min(channels.revolutions, _LONGEST)}
-    record = length | table_of(table, "record", name)
+    record = length | table_of(table, "record", known.name)
     record |= {
         "samples_per_revolution": channels.n,
         "keep": ["waveform"],
@@ -137,11 +167,12 @@ def read_problem(
     }
     machine = Machine(
         study=_of_whole_periods(
-            study_of(table | {"grid": at_medians, "record": record}, source, trust_rig=trust_rig), period or 1
+            study_of(table | {"grid": at_medians, "record": record}, Path(study), trust_rig=trust_rig),
+            period or 1,
         ),
-        tables={key: table_of(table, key, name) for key in ("contact", "integrator", "initial")},
+        tables=known.tables,
         channels=channels,
-        priors=priors,
+        priors=known.priors,
     )
     rub, others = hypotheses_of(machine, comparison)
     return Problem(

@@ -27,6 +27,7 @@ def test_cases_are_found_again_by_all_ranks(tmp_path):
     assert found.status == 0
     assert (found.seen.values == 2.0 + 1j).all()
     assert found.contact_fraction.tolist() == [2.0]
+    assert found.seen.values.flags.aligned  # sums round as on arrays that were not stored
     assert opened(tmp_path, "another study").of(np.array([1.0, 0.5])) is None
 
 
