@@ -12,7 +12,9 @@ import click
 @click.option(
     "--output", type=click.Path(path_type=Path), metavar="DIR", help="[default: STUDY_calibrated here]"
 )
-@click.option("--posteriors", type=click.IntRange(min=2), default=100, show_default=True, help="A noise level.")
+@click.option(
+    "--posteriors", type=click.IntRange(min=2), default=100, show_default=True, help="A noise level."
+)
 @click.option(
     "--noise",
     type=click.FloatRange(min=0.0, min_open=True),
@@ -64,8 +66,9 @@ def calibrate(
     """Test identification on records whose truth is known.
 
     Truths are drawn from the priors in [grid] of STUDY.toml. Prints how often the intervals of the posteriors
-    hold them, and whether their ranks are uniform, as a Markdown table. DIR keeps each posterior's result; the
-    same command resumes after a stop. With --workers, or under mpirun, several processes share the posteriors.
+    hold them, and whether their ranks are uniform, as a Markdown table. DIR keeps the result of each
+    posterior; the same command resumes after a stop. With --workers, or under mpirun, several processes share
+    the posteriors.
     """
     from rubhpc.identification.calibration import Trial, calibrate_on, in_table
     from rubhpc.identification.evaluation import processes, take_part

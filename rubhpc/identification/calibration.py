@@ -13,7 +13,7 @@ import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -133,7 +133,12 @@ def rank_of(trial: Trial) -> Ranked:
 def _name(trial: Trial, known: Known) -> str:
     """Name of the file of a trial, by all that its result depends on."""
     study = study_of(known.table | {"grid": known.at_medians}, Path(trial.study), trust_rig=trial.trust_rig)
-    content = [asdict(trial) | {"study": "", "output": ""}, known.table, known.rig.as_dict(), physics_of(study)]
+    content = [
+        asdict(trial) | {"study": "", "output": ""},
+        known.table,
+        known.rig.as_dict(),
+        physics_of(study),
+    ]
     key = hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()[:16]
     return f"noise-{trial.noise:g}-{trial.draw}-{key}"
 
@@ -186,9 +191,7 @@ def _measured(trial: Trial, known: Known, rng: np.random.Generator) -> tuple[Flo
     else:
         raise InputError(f"{trial.study}: no case of the prior can be computed; narrow the priors")
     signals = found.to_dataset()
-    sensors = {
-        name: Sensor(white=trial.noise * float(signals[name].std() or 1.0)) for name in trial.signals
-    }
+    sensors = {name: Sensor(white=trial.noise * float(signals[name].std() or 1.0)) for name in trial.signals}
     rate = _RATE * float(signals["spin_speed"]) / (2.0 * math.pi)
     sensed = sense(signals, sensors, rate=rate, seed=int(rng.integers(2**31)))
     with TemporaryDirectory() as folder:

@@ -144,7 +144,7 @@ def channels_of(measured: xr.Dataset) -> Channels:
 
 
 def _slip(waves: Floats, n: int) -> float:
-    """Return the true speed over the one by which signals were resampled: where the lines at 1X to 4X stand."""
+    """Return the true speed over the one that was taken, by the place of the lines at 1X to 4X."""
     size = np.maximum(waves.std(axis=1, keepdims=True), np.finfo(float).tiny)
     whole = waves / size * np.hanning(waves.shape[1])
     revolutions = waves.shape[1] / n

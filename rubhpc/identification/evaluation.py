@@ -128,7 +128,7 @@ class Shared:
 
 
 def processes(workers: int) -> AbstractContextManager[Pool]:
-    """Return the processes of this run: the ranks of a launcher, or so many workers, of which the first is this.
+    """Return the processes of this run: the ranks of a launcher, or so many workers.
 
     Raises
     ------

@@ -78,7 +78,7 @@ def _verdict(evidence: dict[str, tuple[float, float]], rub: str) -> Iterator[str
 
 
 def _odds(evidence: dict[str, tuple[float, float]], one: str, other: str) -> tuple[float, str, str]:
-    """Lead of one over the other, the odds of the better one, "" where they say nothing, and how sure it is."""
+    """Lead of one over the other, odds of the better one ("": they say nothing), how sure it is."""
     lead = evidence[one][0] - evidence[other][0]
     size, doubt = abs(lead), math.hypot(evidence[one][1], evidence[other][1])
     if size < max(_LIKELY, doubt):

@@ -66,7 +66,9 @@ def test_the_likelihood_is_the_integral_over_angles_and_discrepancies(is_absolut
 def test_unknown_angles_do_not_matter_known_ones_by_whole_revolutions_alone():
     free, fixed = (LineComparison(channels(noisy(), known), 2, []) for known in (False, True))
     at = {turned: motion(turned) for turned in (0.0, 1.1, 2 * np.pi)}
-    assert log_likelihood(free, free.of(at[1.1])) == pytest.approx(log_likelihood(free, free.of(at[0.0])), abs=1e-3)
+    assert log_likelihood(free, free.of(at[1.1])) == pytest.approx(
+        log_likelihood(free, free.of(at[0.0])), abs=1e-3
+    )
     one, other, whole = (log_likelihood(fixed, fixed.of(waves)) for waves in at.values())
     assert whole == pytest.approx(one, abs=1e-6)
     assert other < one - 10.0
@@ -86,7 +88,9 @@ def test_unknown_forces_are_integrated_over():
     lines = LineComparison(channels(waves, is_absolute=True), 1, [])
     shapes = np.array([[1.0 + 0.5j], [0.3 - 1j]])
     unknown = Unknown(2.0, shapes, np.array([0.1, 0.4]))
-    without = np.stack([row - 2 * np.real(np.mean(row * np.exp(-2j * ANGLE)) * np.exp(2j * ANGLE)) for row in motion()])
+    without = np.stack(
+        [row - 2 * np.real(np.mean(row * np.exp(-2j * ANGLE)) * np.exp(2j * ANGLE)) for row in motion()]
+    )
     seen = lines.of(without)
     rng = np.random.default_rng(2)
     sizes = rng.choice(unknown.sizes, 40000)

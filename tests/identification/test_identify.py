@@ -49,8 +49,12 @@ def test_the_posterior_is_inference_data_with_what_it_predicts(found):
     stored = arviz.from_netcdf(folder / "posterior.nc")
     groups = {"posterior", "prior", "sample_stats", "posterior_predictive", "observed_data"}
     assert groups <= set(stored.groups())
-    assert float(arviz.summary(stored.posterior[["friction"]])["mean"].iloc[0]) == pytest.approx(0.3, abs=0.02)
-    seen, predicted = (one.tree[group]["spectrum_torsion"] for group in ("observed_data", "posterior_predictive"))
+    assert float(arviz.summary(stored.posterior[["friction"]])["mean"].iloc[0]) == pytest.approx(
+        0.3, abs=0.02
+    )
+    seen, predicted = (
+        one.tree[group]["spectrum_torsion"] for group in ("observed_data", "posterior_predictive")
+    )
     first = int(np.flatnonzero(np.isclose(seen["order"], 1.0))[0])
     assert predicted.values[..., first] == pytest.approx(float(seen[first]), rel=0.05)
 
@@ -137,7 +141,12 @@ def test_the_command_writes_posterior_and_figures(rub, tmp_path, monkeypatch):
     assert done.exit_code == 0, done.output
     assert "it is a rub" in done.output
     folder = tmp_path / "probe_identified"
-    assert {path.name for path in folder.iterdir()} == {"cases", "posterior.nc", "corner.png", "predicted.png"}
+    assert {path.name for path in folder.iterdir()} == {
+        "cases",
+        "posterior.nc",
+        "corner.png",
+        "predicted.png",
+    }
     alone = rubhpc.identify(*rub, live=12, draws=50)
     with xr.open_datatree(folder / "posterior.nc", engine="h5netcdf") as stored:
         assert stored["posterior"].equals(alone.tree["posterior"])  # any number of processes

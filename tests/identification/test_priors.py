@@ -33,7 +33,9 @@ def test_mean_and_std_are_normal_within_what_is_valid():
 
 def test_values_of_a_list_and_whole_numbers_are_equally_likely():
     listed = read_prior("stator.angle", ["0 deg", "90 deg"], RIG, "")
-    assert [listed.at(share) for share in (0.0, 0.49, 0.51, 1.0)] == pytest.approx([0, 0, np.pi / 2, np.pi / 2])
+    assert [listed.at(share) for share in (0.0, 0.49, 0.51, 1.0)] == pytest.approx(
+        [0, 0, np.pi / 2, np.pi / 2]
+    )
     node = read_prior("stator.1.node", {"start": 5, "stop": 8}, RIG, "")
     assert sorted(set(drawn(node))) == [5, 6, 7, 8]
     assert at_shares((listed, node), np.array([0.6, 0.3])) == pytest.approx([np.pi / 2, 6])
