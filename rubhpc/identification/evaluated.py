@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import zlib
 from typing import TYPE_CHECKING, Any
 
@@ -90,8 +91,9 @@ class Evaluated:
         try:
             with self._path.open("ab") as file:
                 # After a part of an entry nothing more would be read.
-                if rest := file.tell() % (len(entry) + 4):
-                    file.truncate(file.tell() - rest)
+                end = file.seek(0, os.SEEK_END)
+                if rest := end % (len(entry) + 4):
+                    file.truncate(end - rest)
                 file.write(entry + zlib.crc32(entry).to_bytes(4, "little"))
         except OSError as error:
             raise InputError(

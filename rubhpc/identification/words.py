@@ -1,4 +1,4 @@
-"""What an identification has found, in words: what, where, how sure, and what the data cannot tell apart."""
+"""What an identification has found, in words: what, where, how sure, and what the data leave open."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def _verdict(evidence: dict[str, tuple[float, float]], rub: str) -> Iterator[str
     others = sorted((name for name in evidence if name != rub), key=lambda name: -evidence[name][0])
     lead, odds, sure = _odds(evidence, rub, others[0])
     if not odds:
-        yield f"the data do not tell a rub from {others[0]}"
+        yield f"the data do not distinguish a rub from {others[0]}"
     elif lead > 0.0:
         yield f"it is {sure}a rub: {odds} against {others[0]}{_BEFORE}"
     else:
@@ -74,7 +74,7 @@ def _verdict(evidence: dict[str, tuple[float, float]], rub: str) -> Iterator[str
         if odds:
             yield f"it is {sure}{others[0]}: {odds} against {others[1]}"
         else:
-            yield f"the data do not tell {others[0]} from {others[1]}"
+            yield f"the data do not distinguish {others[0]} from {others[1]}"
 
 
 def _odds(evidence: dict[str, tuple[float, float]], one: str, other: str) -> tuple[float, str, str]:
@@ -150,7 +150,7 @@ def _values(found: Found, tree: xr.DataTree) -> Iterator[str]:
             continue
         tied = float(spearmanr(draws[first], draws[second]).statistic)
         if abs(tied) > _TIED:
-            yield f"the data cannot tell {first} from {second} (rank correlation {tied:.2f})"
+            yield f"the data cannot distinguish {first} from {second} (rank correlation {tied:.2f})"
 
 
 def _before(prior: Prior) -> str:
