@@ -97,7 +97,7 @@ class Figure:
             self.options[name].check(value)
         function = getattr(import_module(f"postproc.figures.{self.name}"), self.name)
         drawing: Drawing = function(named_places(cases), *args, **words)
-        return replace(drawing, verdict=verdict_of(cases))
+        return replace(drawing, verdict=(*drawing.verdict, *verdict_of(cases)))
 
 
 def figures() -> dict[str, Figure]:

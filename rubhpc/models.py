@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 # Geometry of a beam stator, which is that of the gap where it bends.
 LINEAR, SECOND_ORDER = "linear", "second_order"
 # What a study has that gives none of these keys, nor a model.
-NORMAL, FRICTION_LAW, GEOMETRY = "fixed", "sliding", LINEAR
+NORMAL, FRICTION_LAW, GEOMETRY = "updated", "coulomb", SECOND_ORDER
 
 MOKHTAR2017 = "mokhtar2017"
 MODELS = {

@@ -7,8 +7,8 @@ angle a and the distance rho from the shaft's axis that follows the carrier's mo
 
 the shape Phi of the stator. Springs and dampers act on the motion relative to it, `B = (-Phi, 1)`: with the
 matrices K and D of the stator on a carrier that is held, they are `B^T K B` and `B^T D B`, so that a stator
-moved as a whole is neither strained nor damped. The mass matrix of a cantilever is that of the free beam,
-with the root following the carrier.
+moved as a whole is neither strained nor damped. The squared slope of a bent one is relative, too. The mass
+matrix of a cantilever is that of the free beam, with the root following the carrier.
 """
 
 from __future__ import annotations
@@ -103,6 +103,7 @@ def assemble_carrier(
     motions = [i for i, name in enumerate(MOTIONS) if name in names]
     degrees = [(1, name) for name in names]
     rows: list[list[int]] = []
+    slopes: list[Floats | None] = []
     for _, stator, model in stators:
         mounting = mount(stator, model)
         first, n_node = len(degrees), max(node for node, _ in degrees)
@@ -112,6 +113,10 @@ def assemble_carrier(
         relative = np.hstack([-mounting.shape[:, motions], np.eye(model.body.n_dof)])
         damping[met] += relative.T @ model.body.damping @ relative
         stiffness[met] += relative.T @ model.body.stiffness @ relative
+        slope = None if model.squared_slope is None else np.zeros_like(mass)
+        if slope is not None:
+            slope[met] = relative.T @ model.squared_slope @ relative
+        slopes.append(slope)
         kept = [*motions, *range(3, 3 + model.body.n_dof)]
         mass[met] += mounting.mass[np.ix_(kept, kept)]
     body = Body(
@@ -129,8 +134,9 @@ def assemble_carrier(
             alone=model,
             axial=of[model.axial],
             lateral=of[model.lateral],
+            squared_slope=slope,
         )
-        for of, (_, _, model) in zip(rows, stators, strict=True)
+        for of, slope, (_, _, model) in zip(rows, slopes, stators, strict=True)
     ]
     return CarrierModel(name=carrier.name, body=body, stators=numbers), placed
 

@@ -235,7 +235,7 @@ class Record(RecordVariables):
         residual = self.measures.get("energy_residual", 0.0)
         texts = [text for text in (self.reason, self.note) if text]
         if not self.reason and residual > MOST_RESIDUAL:
-            is_stepped = SCHEMES[self.measures.get("scheme", 0)] == "central_difference"
+            is_stepped = self.measures.get("scheme") == SCHEMES.index("central_difference")
             fix = "a shorter step" if is_stepped else "a smaller accuracy"
             texts.append(f"its energy balance is off by {100 * residual:.2g} %; use {fix}")
         if not self.reason and self.advice:

@@ -62,22 +62,32 @@ def friction_coefficient(law: Law, friction: float, slip_speed: float, is_sticki
     is_sticking : bool
         Whether the pair stuck in the step before.
     """
-    if law.friction_law == STRIBECK:
-        excess = law.static_friction_ratio - 1.0
-        return friction * (1.0 + excess * math.exp(-abs(slip_speed) / law.stribeck_speed))
-    if law.friction_law == TABLE:
-        return friction * interpolated(law.slip_speed, law.friction_ratio, abs(slip_speed))
-    return friction * (law.static_friction_ratio if is_sticking else 1.0)
+    if is_sticking and not is_varied(law):
+        return friction * law.static_friction_ratio
+    return sliding_friction(law, friction, slip_speed)[0]
 
 
 @linked
-def interpolated(at: NDArray[np.float64], values: NDArray[np.float64], x: float) -> float:
-    """Linear interpolation at x between ascending places; constant beyond the last one."""
-    for i in range(1, at.size):
-        if x < at[i]:
-            share = (x - at[i - 1]) / (at[i] - at[i - 1])
-            return float(values[i - 1] + share * (values[i] - values[i - 1]))
-    return float(values[-1])
+def is_varied(law: Law) -> bool:
+    """Whether the coefficient of friction depends on the slip speed."""
+    return law.friction_law != SLIDING and law.friction_law != COULOMB
+
+
+@linked
+def sliding_friction(law: Law, friction: float, slip_speed: float) -> tuple[float, float]:
+    """Coefficient of friction at a slip speed (m/s), and its slope in it (s/m)."""
+    speed, sense = abs(slip_speed), 1.0 if slip_speed >= 0.0 else -1.0
+    if law.friction_law == STRIBECK:
+        excess = friction * (law.static_friction_ratio - 1.0) * math.exp(-speed / law.stribeck_speed)
+        return friction + excess, -sense * excess / law.stribeck_speed
+    if law.friction_law == TABLE:
+        at, values = law.slip_speed, law.friction_ratio
+        for i in range(1, at.size):
+            if speed < at[i]:
+                slope = friction * (values[i] - values[i - 1]) / (at[i] - at[i - 1])
+                return friction * values[i - 1] + slope * (speed - at[i - 1]), sense * slope
+        return friction * values[-1], 0.0
+    return friction, 0.0
 
 
 @linked

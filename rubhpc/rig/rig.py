@@ -226,8 +226,7 @@ class Rig:
     def with_geometry(self, geometry: str) -> Rig:
         """Return the rig with a geometry of the beam stators that give none."""
         stators = tuple(
-            replace(one, geometry=geometry) if isinstance(one, Stator) and one.geometry is None else one
-            for one in self.stator
+            one.with_geometry(geometry) if isinstance(one, Stator) else one for one in self.stator
         )
         return self if stators == self.stator else replace(self, stator=stators)
 

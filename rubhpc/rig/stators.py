@@ -129,14 +129,15 @@ class Stator(Seat):
                 raise FieldError(name, f'missing; add {name} = "5 mm", or diameter for a round stator')
             if side is not None and self.diameter is not None:
                 raise FieldError(name, "conflicts with diameter; remove one of them")
-        if self.geometry == SECOND_ORDER and self.carrier is not None:
-            problem = "second_order needs a stator on the ground, and this one stands on a carrier"
-            raise FieldError("geometry", f'{problem}; set geometry = "linear", or remove carrier')
 
     @property
     def is_bent(self) -> bool:
         """Whether its gap knows that it bends: second order of a stator that is free to."""
-        return self.lateral and (self.geometry or default_of("geometry")) == SECOND_ORDER
+        return self.lateral and self.with_geometry(default_of("geometry")).geometry == SECOND_ORDER
+
+    def with_geometry(self, geometry: str) -> Stator:
+        """Return the stator with a geometry where it gives none."""
+        return self if self.geometry is not None else replace(self, geometry=geometry)
 
     @property
     def carrier_problem(self) -> str:

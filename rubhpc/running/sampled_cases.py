@@ -175,6 +175,7 @@ class CaseTimer:
     def __init__(self, grid: CaseGrid, end: float) -> None:
         self._grid, self._study = grid, grid.study
         self._end = end - seconds_compiling()
+        self._most_memory = max(MOST_MEMORY, 1.5 * memory())  # a script may hold more than that
         self._peak = 0.0  # memory since the beginning of the latest batch
         self._setups = KeptSetups(grid.study)
         self._n_part = 0  # parts of run-ups so far
@@ -207,9 +208,9 @@ class CaseTimer:
             is_known = n >= least and spent > _ENOUGH and high < _AGREED * low
             if is_known or n + len(sample.failures) >= _MOST_CASES or (n and self.left <= 0.0):
                 break
-            if memory() > 0.5 * MOST_MEMORY:
+            if memory() > 0.5 * self._most_memory:
                 self._free()
-                if n and memory() > 0.9 * MOST_MEMORY:
+                if n and memory() > 0.9 * self._most_memory:
                     break
             say(f"timing cases: {n} so far")
             try:
@@ -277,8 +278,8 @@ class CaseTimer:
         if is_compiling():
             return
         self._peak = max(self._peak, now := memory())
-        self.sample.was_full |= now > MOST_MEMORY
-        if now > MOST_MEMORY or self.left <= 0.0:
+        self.sample.was_full |= now > self._most_memory
+        if now > self._most_memory or self.left <= 0.0:
             raise Enough
 
     def _time_batch(self, indices: list[Index], steps: float, untimed: NDArray[np.bool_]) -> None:
@@ -305,7 +306,7 @@ class CaseTimer:
                     self._latest = (case, timed) if timed.share > 0.0 else self._latest
                     break
                 is_long = sum(case.spent for case in cases) > _LONG
-                if is_long or memory() > 0.7 * MOST_MEMORY or self.left <= 0.0:
+                if is_long or memory() > 0.7 * self._most_memory or self.left <= 0.0:
                     break
         except Exception as error:  # others are timed in spite of an error
             sample.failures.append((index, f"{type(error).__name__}: {' '.join(str(error).split())}"))

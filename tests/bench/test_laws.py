@@ -28,6 +28,8 @@ COULOMB = {"friction_law": "coulomb"}
 PENALTY = {"law": "penalty", "stiffness": 1e7}
 UPDATED = {"normal": "updated"}
 BENT = {"geometry": "second_order"}
+DEFAULT = UPDATED | BENT | COULOMB
+HERTZ = {"law": "hertz", "stiffness": 1e10}
 WHIP = 0.11  # s, of a dry whip, reached; 0.05 are asked
 ROWS = [  # rig, friction, cases (speed ratio, clearance), law, the ratio asked or held
     ("one stator, 52 cases", 1, 0.5, GRID, "Coulomb", COULOMB, 3.0),
@@ -37,6 +39,8 @@ ROWS = [  # rig, friction, cases (speed ratio, clearance), law, the ratio asked 
     ("one stator, 52 cases", 1, 0.5, GRID, "Coulomb, penalty", COULOMB | PENALTY, 3.0),
     ("one stator, 12 cases", 1, 0.3, MAP, "updated normal", UPDATED, 10.0),
     ("one stator, 12 cases", 1, 0.3, MAP, "second order, updated", UPDATED | BENT, 10.0),
+    ("one stator, 12 cases", 1, 0.3, MAP, "second order, updated, Coulomb", DEFAULT, 20.0),
+    ("one stator, 12 cases", 1, 0.3, MAP, "second order, updated, Coulomb, Hertz", DEFAULT | HERTZ, 30.0),
     ("ring of 16, 2 cases", 16, 0.1, RUBS, "Coulomb", COULOMB, 5.0),
 ]
 

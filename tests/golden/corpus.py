@@ -159,21 +159,22 @@ _MACHINES: dict[str, Callable[[], Rig]] = {
 }
 
 
+def _with_geometry(machine_name: str, law: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
+    """The rig with the geometry of a law, and the other keys of the law."""
+    rig = machine(machine_name).with_geometry(law["geometry"])
+    return rig, {key: value for key, value in law.items() if key != "geometry"}
+
+
 def _simulated(machine_name: str, law: dict[str, Any], **given: Any) -> Arrays:
     """Early waveforms and measures of a case from rest, or from where `given` says."""
-    rig = machine(machine_name)
-    law = dict(law)
-    geometry = law.pop("geometry")
-    bends = any(isinstance(stator, rubhpc.Stator) for stator in rig.stator)
+    rig, law = _with_geometry(machine_name, law)
     options = {
         "transient": 0,
         "revolutions": 12,
         "samples_per_revolution": PER_REVOLUTION,
         "keep": ("waveform",),
     }
-    record = rubhpc.simulate(
-        rig, **law, **(options | given), overrides={"stator.geometry": geometry} if bends else None
-    )
+    record = rubhpc.simulate(rig, **law, **(options | given))
     n = EARLY * PER_REVOLUTION
     kept = {name: record.signals[name][..., 1:n:2] for name in SIGNALS}
     settled = ("period", "regime", *STABILITY) if given.get("transient") else ()
@@ -191,7 +192,7 @@ def _settled(machine_name: str, law: dict[str, Any], **given: Any) -> Arrays:
 
 def _run_up(machine_name: str, law: dict[str, Any], **given: Any) -> Arrays:
     """The course of a run-up, a coast-down or a drive: every fourth revolution, and samples."""
-    rig, law = machine(machine_name), {k: v for k, v in law.items() if k != "geometry"}
+    rig, law = _with_geometry(machine_name, law)
     data = rubhpc.run_up(rig, **law, samples_per_revolution=PER_REVOLUTION, **given)
     one = data.sel(order=1.0) if "order" in data.dims else data
     amplitudes = tuple(f"amplitude_{name}" for name in ("vertical", "horizontal", "torsion"))
@@ -202,7 +203,7 @@ def _run_up(machine_name: str, law: dict[str, Any], **given: Any) -> Arrays:
 
 def _periodic(machine_name: str, law: dict[str, Any], **given: Any) -> Arrays:
     """A motion that is solved for, and its multipliers."""
-    rig, law = machine(machine_name), {k: v for k, v in law.items() if k != "geometry"}
+    rig, law = _with_geometry(machine_name, law)
     motion = rubhpc.periodic(rig, **law, samples_per_revolution=PER_REVOLUTION, **given)
     largest, size = np.sort(np.abs(motion.multipliers))[::-1][:2], np.linalg.norm(motion.monodromy)
     signals = {name: motion.record.signals[name] for name in SIGNALS}
@@ -211,7 +212,7 @@ def _periodic(machine_name: str, law: dict[str, Any], **given: Any) -> Arrays:
 
 def _branch(machine_name: str, law: dict[str, Any], **given: Any) -> Arrays:
     """Events of a branch, and what it is at its ends."""
-    rig, law = machine(machine_name), {k: v for k, v in law.items() if k != "geometry"}
+    rig, law = _with_geometry(machine_name, law)
     (curve, *_) = rubhpc.branch(rig, **law, samples_per_revolution=PER_REVOLUTION, doublings=0, **given)
     return {
         "events": np.array([value for _, value in curve.events()]),

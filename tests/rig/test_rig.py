@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -45,6 +46,11 @@ def test_a_carrier_that_is_mistyped_is_named(tmp_path):
     (tmp_path / "a.toml").write_text(packaged.replace("[[stator]]", text))
     with pytest.raises(InputError, match=r"no carrier is named casng; did you mean casing\?"):
         read_rig(tmp_path / "a.toml")
+
+
+def test_a_beam_that_is_free_to_bends_to_second_order_by_default(rig):
+    held = replace(rig, stator=(replace(rig.stator[0], lateral=False),))
+    assert [one.stator[0].is_bent for one in (rig, held, rig.with_geometry("linear"))] == [True, False, False]
 
 
 def test_inertia_of_a_disc_is_the_integral_over_its_points():

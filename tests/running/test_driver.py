@@ -165,7 +165,9 @@ def test_a_balance_that_is_off_is_named(physics, study):
     assert "4 done with a remark" in summary.text()
     failures = read_status(other.output).failures
     assert len(failures) == 4
-    assert {reported for _, reported in failures} == {"its energy balance is off by 25 %; use a shorter step"}
+    assert {reported for _, reported in failures} == {
+        "its energy balance is off by 25 %; use a smaller accuracy"
+    }
     assert "friction=0.3: done" in failures[0][0]
 
 

@@ -180,11 +180,19 @@ def test_long_cases_are_cut_and_extrapolated(study, monkeypatch):
 
 
 def test_a_case_is_cut_for_its_memory(study, monkeypatch):
-    physics = Physics(monkeypatch, lambda case: 1.0)
-    physics.held = 2 * sampled_cases.MOST_MEMORY
+    physics = Physics(monkeypatch, lambda case: setattr(physics, "held", held) or 1.0)
+    physics.held, held = 0.0, 2 * sampled_cases.MOST_MEMORY
     sample, taken = physics.plan(study)
     assert sample.was_full
     assert taken < 0.1
+
+
+def test_a_script_that_holds_much_has_a_plan(study, monkeypatch):
+    physics = Physics(monkeypatch, lambda case: 0.1)
+    physics.held = 3 * sampled_cases.MOST_MEMORY
+    sample, _ = physics.plan(study)
+    assert sample.n_case > 1
+    assert not sample.was_full
 
 
 def test_a_set_up_without_checks_is_cut(study, monkeypatch):

@@ -8,13 +8,10 @@ import pytest
 from running import write_study
 
 import rubhpc
-import rubhpc.study.study
-from postproc.figures.map import map  # noqa: A004
+from postproc.catalogue import figures
 from postproc.report.budget import write_report
 from postproc.store.export import write_hdf5
-from postproc.store.open import open_store
 from postproc.store.rig_of_case import rig_of
-from rubhpc import models
 from rubhpc.errors import StoreError
 from rubhpc.storage.manifest import Manifest
 from rubhpc.storage.resume import grid_for
@@ -28,8 +25,8 @@ KEYS = "normal", "friction_law"
 
 
 @pytest.fixture
-def older(tmp_path, monkeypatch):
-    """A finished store without the keys, and other defaults since."""
+def older(tmp_path):
+    """A finished store without the keys, whose cases are of the fixed normal, sliding and linear stators."""
     study = read_study(write_study(tmp_path, **SMALL))
     rubhpc.run(study, quiet=True)
     manifest = Manifest.read(study.output)
@@ -44,17 +41,13 @@ def older(tmp_path, monkeypatch):
     text = json.dumps(group).encode()
     path.write_bytes(text)
     replace(manifest, files=manifest.files | {"zarr.json": crc32(text)}).write(study.output)
-    monkeypatch.setattr(models, "NORMAL", "updated")
-    monkeypatch.setattr(models, "FRICTION_LAW", "coulomb")
-    monkeypatch.setattr(models, "GEOMETRY", "second_order")
-    monkeypatch.setattr(rubhpc.study.study, "check_method", lambda contact, integrator, *, is_bent: None)
     return study.output
 
 
 def test_it_is_read_as_ever(older, tmp_path):
     assert not verify(older)
-    cases = open_store(older)
-    drawing = map(cases, x="clearance_ratio", y="friction")
+    cases = rubhpc.open(older)
+    drawing = figures()["map"].of(cases, x="clearance_ratio", y="friction")
     assert drawing.verdict == ("model mokhtar2017",)
     drawing.save(tmp_path / "map.png")
     assert not rig_of(cases.isel(friction=0, clearance_ratio=0, speed_ratio=0)).stator[0].is_bent
@@ -95,11 +88,9 @@ def test_what_a_study_says_itself_is_not_added(older, tmp_path, contact, rest, m
     assert message in str(refused.value)
 
 
-def test_keys_are_named_one_by_one_where_no_model_has_them(tmp_path, monkeypatch):
+def test_keys_are_named_one_by_one_where_no_model_has_them(tmp_path):
     given = SMALL | {"contact": 'normal = "fixed"\nfriction_law = "coulomb"'}
     study = read_study(write_study(tmp_path, **given))
     Store.create(study.output, CaseGrid(study))
-    monkeypatch.setattr(models, "NORMAL", "updated")
-    monkeypatch.setattr(models, "FRICTION_LAW", "coulomb")
     with pytest.raises(StoreError, match=r'add \[contact\] normal = "fixed" to the study, or choose another'):
         grid_for(read_study(write_study(tmp_path, **SMALL | {"contact": ""})))

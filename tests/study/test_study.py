@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from malformed import CASES, RIG, STUDY, Malformed
 
-from rubhpc import models
 from rubhpc.errors import InputError
 from rubhpc.rig.reading import PACKAGED, read_rig
 from rubhpc.study.identity import identity_parts
@@ -106,30 +105,20 @@ def test_the_grid_keeps_its_order(tmp_path):
     ]
 
 
-def test_defaults_are_the_exact_scheme_and_the_rest_of_the_paper(tmp_path):
+def test_defaults_are_written_out(tmp_path):
     study = grid(tmp_path, "")
     assert study.title == "s"
     assert study.output == Path("s.zarr")
-    assert study.rig == read_rig("mokhtar2017").with_geometry(models.GEOMETRY)
-    assert study.contact == Contact(
-        law="lagrange", friction_law=models.FRICTION_LAW, normal=models.NORMAL, model=None
-    )
+    assert study.rig == read_rig("mokhtar2017").with_geometry("second_order")
+    assert study.contact == Contact(law="lagrange", friction_law="coulomb", normal="updated", model=None)
     assert study.integrator == Integrator(method="modal", step=None, accuracy=1e-3)
     assert study.recording == Recording(transient=120, revolutions=64, samples_per_revolution=256)
     assert study.recording.keep == ("waveform", "spectrum", "section")
     assert study.run == Run(block=None, time_limit=None, case_time_limit=None, max_failures=None)
 
 
-@pytest.fixture
-def other_defaults(monkeypatch):
-    """Defaults that are not those of the model, for whatever can be read without them."""
-    monkeypatch.setattr(models, "NORMAL", "updated")
-    monkeypatch.setattr(models, "FRICTION_LAW", "coulomb")
-    monkeypatch.setattr(models, "GEOMETRY", "second_order")
-    monkeypatch.setattr("rubhpc.study.study.check_method", lambda contact, integrator, *, is_bent: None)
-
-
-def test_one_place_holds_the_defaults(tmp_path, other_defaults):
+def test_the_default_is_the_physics(tmp_path):
+    """A stator that cannot bend is linear."""
     study = grid(tmp_path, "")
     assert (study.contact.normal, study.contact.friction_law) == ("updated", "coulomb")
     assert study.rig.stator[0].is_bent
@@ -140,7 +129,7 @@ def test_one_place_holds_the_defaults(tmp_path, other_defaults):
     assert grid(tmp_path, '"stator.1.lateral" = [false, true]').has_bent_stator
 
 
-def test_a_model_stands_for_its_keys(tmp_path, other_defaults):
+def test_a_model_stands_for_its_keys(tmp_path):
     """Also for the identity; a stator that gives its geometry keeps it."""
     study = grid(tmp_path, "", contact='model = "mokhtar2017"')
     assert (study.contact.normal, study.contact.friction_law) == ("fixed", "sliding")

@@ -27,7 +27,7 @@ MEASURES = (
     "contact_fraction",
     "stick_fraction",
 )
-PACKAGED = read_rig("mokhtar2017")
+PACKAGED = read_rig("mokhtar2017").with_geometry("linear")
 BENT = with_keys(PACKAGED, {"stator.geometry": "second_order"})
 SLOW_RIM = {"stator.radius": 0.004}  # m: sticks
 CASING = {"mass": 2.0, "stiffness": 5e5, "inertia": 0.02, "torsional_stiffness": 2e4, "damping": 50.0}
@@ -59,6 +59,7 @@ HERTZ = {"law": "hertz", "stiffness": 1e9}
 STRIBECK = {"friction_law": "stribeck", "static_friction_ratio": 1.5, "stribeck_speed": 0.1}
 TABLE = {"friction_law": "table", "slip_speed": (0.0, 0.2, 1.0), "friction_ratio": (1.5, 1.1, 0.9)}
 BASE = {"speed_ratio": 0.75, "clearance": 84e-6, "friction": 0.3, "revolutions": 3}
+BASE |= {"normal": "fixed", "friction_law": "sliding"}
 SLIM = with_keys(BENT, SLOW_RIM)
 HIGH = {"friction": 0.5}
 WEIGHT = {"rotor.gravity": 9.81}
@@ -107,6 +108,10 @@ CASES = {
     "overhung": (pump(), UPDATED | COULOMB | {"clearance": 30e-6, "speed": 300.0}),
     "gravity": (with_keys(BENT, WEIGHT | {"stator.angle": math.pi}), UPDATED | COULOMB),
     "carrier": (beams(4, PACKAGED, (Carrier(name="casing", **CASING),), carrier="casing"), UPDATED | COULOMB),
+    "carrier, bent": (
+        beams(4, carriers=(Carrier(name="casing", **CASING),), carrier="casing"),
+        UPDATED | COULOMB,
+    ),
     "two nodes": (two_nodes(), UPDATED | COULOMB),
 }
 

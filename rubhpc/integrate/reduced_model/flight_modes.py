@@ -26,7 +26,7 @@ from rubhpc.kernels.collocation.structures import (
 )
 from rubhpc.kernels.contact_modes import LATERAL_RATE, LATERAL_ROW, N_ROTOR_ROW
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, TORSION, V, W, rim_sense
-from rubhpc.kernels.laws import LAGRANGE, STRIBECK, TABLE, is_set_valued
+from rubhpc.kernels.laws import LAGRANGE, is_set_valued, is_varied
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -221,7 +221,7 @@ class FlightModes:
             restitution=np.full(q, law.restitution),
             law=law,
             is_sticky=bool(plain(is_set_valued)(law)),
-            is_varied=law.friction_law in (STRIBECK, TABLE),
+            is_varied=bool(plain(is_varied)(law)),
             translations=self.rows(setup.reduced.translations @ self.shape[:n]),
             displacement_limit=setup.displacement_limit,
         )

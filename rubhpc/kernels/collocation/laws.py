@@ -6,7 +6,7 @@ import math
 
 from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.collocation.structures import Bodies  # noqa: TC001 - part of a kernel's signature
-from rubhpc.kernels.laws import COULOMB, HERTZ, STRIBECK, TABLE
+from rubhpc.kernels.laws import HERTZ, friction_coefficient, sliding_friction
 
 
 @linked_sum
@@ -33,25 +33,10 @@ def spring_end(bodies: Bodies, i: int, gap: float, rate: float) -> float:
 @linked_sum
 def friction_ratio(bodies: Bodies, i: int, slip: float) -> tuple[float, float]:
     """Coefficient of friction in sliding at a slip (m/s), and its slope in it."""
-    law, friction = bodies.law, bodies.friction[i]
-    if law.friction_law == STRIBECK:
-        excess = friction * (law.static_friction_ratio - 1.0) * math.exp(-abs(slip) / law.stribeck_speed)
-        slope = -excess / law.stribeck_speed
-        return friction + excess, slope if slip >= 0.0 else -slope
-    if law.friction_law == TABLE:
-        at, values, speed = law.slip_speed, law.friction_ratio, abs(slip)
-        for k in range(1, at.size):
-            if speed < at[k]:
-                slope = friction * (values[k] - values[k - 1]) / (at[k] - at[k - 1])
-                value = friction * values[k - 1] + slope * (speed - at[k - 1])
-                return value, slope if slip >= 0.0 else -slope
-        return friction * values[-1], 0.0
-    return friction, 0.0
+    return sliding_friction(bodies.law, bodies.friction[i], slip)
 
 
 @linked_sum
 def static_friction(bodies: Bodies, i: int) -> float:
     """Largest coefficient of friction of a pair that sticks."""
-    if bodies.law.friction_law == COULOMB:
-        return float(bodies.friction[i] * bodies.law.static_friction_ratio)
-    return friction_ratio(bodies, i, 0.0)[0]
+    return friction_coefficient(bodies.law, bodies.friction[i], 0.0, True)

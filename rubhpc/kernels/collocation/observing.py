@@ -253,11 +253,11 @@ def record_instant(
     seen: Seen,
     load: Floats,
 ) -> None:
-    """Record the sample at the coordinates x, under the loads (R,) of the instant."""
+    """Record the sample at the coordinates x, under the loads of the instant, the first R of `load`."""
     value, direct = seen.measured.recorder.value, signals.direct
     read_rows(signals.value, x, value)
     for r in range(direct.shape[0]):
-        for a in range(load.size):
+        for a in range(direct.shape[1]):
             value[r] += direct[r, a] * load[a]
     take_row_sample(direct.shape[0], clock, progress, seen.measured)
 
