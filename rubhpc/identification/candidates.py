@@ -230,6 +230,10 @@ class Rub:
         """Return what the channels see, (n_channel, n_sample)."""
         return self.machine.channels.of_record(self.machine.simulate(values).signals)
 
+    def unknown(self, values: Sequence[float]) -> Unknown | None:
+        """Return the forces of unknown size that act: none."""
+        return None
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NoRub:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rubhpc.errors import RubError, writing
+from rubhpc.identification.candidates import Rub
 from rubhpc.identification.evaluation import (
     Shared,
     Task,
@@ -159,26 +160,32 @@ def _identify(
     if folder is not None:
         with writing(folder, "--output"):
             (folder / CASES).mkdir(parents=True, exist_ok=True)
-    rub = problem.rub
-    # Kernels are compiled once, and what is wrong with the study is reported, before all processes begin.
-    rub.outcome([prior.at(0.5) for prior in rub.priors])
-    shared.use(Task(rub=rub, folder=folder and folder / CASES, content=problem.content))
 
     def say(n_call: int, log_evidence: float, left: float) -> None:
         report(f"{n_call} cases, ln(evidence) {log_evidence:.1f}, {left:.3g} to come")
 
-    sampled = sample(
-        current_likelihood,
-        current_values,
-        len(rub.priors),
-        mapper=shared,
-        live=live,
-        seed=seed,
-        say=say,
-    )
+    def simulate(rub: Rub) -> Sampled:
+        # Kernels are compiled once, and what is wrong with the study is reported, before all processes begin.
+        rub.outcome([prior.at(0.5) for prior in rub.priors])
+        shared.use(Task(rub=rub, folder=folder and folder / CASES, content=problem.content(rub)))
+        return sample(
+            current_likelihood,
+            current_values,
+            len(rub.priors),
+            mapper=shared,
+            live=live,
+            seed=seed,
+            say=say,
+        )
+
+    sampled = simulate(problem.rub)
     evaluator().evaluated.read()  # those of other ranks
-    others = {other: _sample_alone(other, live, seed) for other in problem.others}
-    found = Found(problem=problem, rub=sampled, others=others, outcome=evaluator().outcome)
+    outcomes = [evaluator().outcome(values) for values in sampled.values]
+    others = {
+        other: simulate(other) if isinstance(other, Rub) else _sample_alone(other, live, seed)
+        for other in problem.others
+    }
+    found = Found(problem=problem, rub=sampled, others=others, outcomes=outcomes)
     tree = tree_of(found, draws, seed)
     if folder is not None:
         path = folder / POSTERIOR

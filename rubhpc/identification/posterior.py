@@ -14,11 +14,11 @@ from rubhpc.identification.comparison import discrepancy_of
 from rubhpc.version import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from rubhpc.identification.candidates import NoRub, Outcome
+    from rubhpc.identification.candidates import Hypothesis, Outcome
     from rubhpc.identification.nested import Sampled
     from rubhpc.identification.priors import Prior
     from rubhpc.identification.problem import Problem
@@ -43,19 +43,14 @@ class Found:
     problem : Problem
     rub : Sampled
     others : mapping of hypothesis to Sampled
-    outcome : callable
-        Of values, as they were evaluated.
+    outcomes : sequence of Outcome
+        Of all points of the rub.
     """
 
     problem: Problem
     rub: Sampled
-    others: Mapping[NoRub, Sampled]
-    outcome: Callable[[Floats], Outcome]
-
-    @cached_property
-    def outcomes(self) -> list[Outcome]:
-        """Of all points of the rub."""
-        return [self.outcome(values) for values in self.rub.values]
+    others: Mapping[Hypothesis, Sampled]
+    outcomes: Sequence[Outcome]
 
     @cached_property
     def touching(self) -> tuple[float, float]:

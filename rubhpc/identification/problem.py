@@ -14,7 +14,7 @@ from postproc.measured.measured import measured
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.modes import modes
-from rubhpc.identification.candidates import Machine, NoRub, Rub, hypotheses_of
+from rubhpc.identification.candidates import Machine, Rub, hypotheses_of
 from rubhpc.identification.channels import channels_of
 from rubhpc.identification.comparison import Comparison, period_of_lines
 from rubhpc.identification.lines import LineComparison
@@ -31,6 +31,7 @@ from rubhpc.study.study import line_of_text, overridden, study_of, table_of
 if TYPE_CHECKING:
     from os import PathLike
 
+    from rubhpc.identification.candidates import Hypothesis
     from rubhpc.identification.channels import Channels
     from rubhpc.identification.priors import Prior
     from rubhpc.rig.rig import Rig
@@ -55,7 +56,7 @@ class Problem:
     machine : Machine
     comparison : Comparison
     rub : Rub
-    others : tuple of NoRub
+    others : tuple of Rub and NoRub
         What else may be behind it.
     note : str
         What is wrong with the record, a problem a line.
@@ -64,7 +65,7 @@ class Problem:
     machine: Machine
     comparison: Comparison
     rub: Rub
-    others: tuple[NoRub, ...]
+    others: tuple[Hypothesis, ...]
     note: str
 
     @property
@@ -72,11 +73,10 @@ class Problem:
         """What was measured."""
         return self.machine.channels
 
-    @property
-    def content(self) -> str:
-        """All that the features of a case depend on, except the values of its open keys."""
-        study = self.machine.study
-        names = [prior.name for prior in self.machine.priors]
+    def content(self, rub: Rub) -> str:
+        """Return all that the features of a case depend on, except the values of its open keys."""
+        study = rub.machine.study
+        names = [prior.name for prior in rub.priors]
         table = {
             "physics": physics_of(study),
             "study": {**study.as_dict(), "title": "", "rig": study.rig.as_dict()},
