@@ -34,6 +34,7 @@ def corner(tree: xr.DataTree) -> Drawing:
 
     def draw(axes: list[Axes]) -> list[Axes]:
         columns = [displayed(shown[name]) for name in names]
+        columns = [(values, label.replace(" (", "\n(")) for values, label in columns]  # panels are narrow
         n = len(names)
         for i, (y, y_label) in enumerate(columns):
             for j, (x, x_label) in enumerate(columns):
@@ -49,9 +50,9 @@ def corner(tree: xr.DataTree) -> Drawing:
                 ax.locator_params(nbins=3)
                 ax.tick_params(axis="x", labelrotation=30.0)
                 if i == n - 1:
-                    ax.set_xlabel(x_label)
+                    ax.set_xlabel(x_label, fontsize="small")
                 if j == 0 and i > 0:
-                    ax.set_ylabel(y_label)
+                    ax.set_ylabel(y_label, fontsize="small")
         return axes
 
     n = len(names)
@@ -145,13 +146,13 @@ def predicted(tree: xr.DataTree) -> Drawing:
 
 
 def _orbit(ax: Axes, observed: xr.Dataset, draws: xr.Dataset) -> None:
-    """The measured orbit over the predicted ones."""
+    """Predicted orbits over the measured one."""
     scale = scale_of(observed["vertical"])
+    v, w = (observed[name].values * scale.factor for name in ("vertical", "horizontal"))
+    ax.plot(w, v, ".", color=_MEASURED, markersize=2.0)
     for vertical, horizontal in zip(draws["vertical"].values, draws["horizontal"].values, strict=True):
         ax.plot(
             horizontal * scale.factor, vertical * scale.factor, color=_PREDICTED, linewidth=0.6, alpha=0.3
         )
-    v, w = (observed[name].values * scale.factor for name in ("vertical", "horizontal"))
-    ax.plot(w, v, ".", color=_MEASURED, markersize=1.0)
     ax.set(xlabel=scale.label("Horizontal"), ylabel=scale.label("Vertical"))
     ax.set_aspect("equal", adjustable="datalim")
