@@ -14,7 +14,18 @@ from rubhpc.kernels.case_progress import LONG_AGO, PAUSED, follow, restart_clock
 from rubhpc.kernels.collocation.flight import LEAST_GAP
 from rubhpc.kernels.collocation.march import LEAST_SCALE, SETTLED, advance_by_collocation
 from rubhpc.kernels.collocation.observing import Seen
-from rubhpc.kernels.collocation.structures import FORWARD, NORMAL, OPEN, CaseState, Solution, new_memory
+from rubhpc.kernels.collocation.structures import (
+    ENDLESS,
+    FORWARD,
+    JAMMED,
+    NORMAL,
+    OPEN,
+    SINGULAR,
+    UNCONVERGED,
+    CaseState,
+    Solution,
+    new_memory,
+)
 from rubhpc.kernels.collocation.tangent import FULL as TOO_MANY
 from rubhpc.kernels.collocation.tangent import Trail
 from rubhpc.kernels.sampling import Measured
@@ -33,6 +44,14 @@ if TYPE_CHECKING:
     from rubhpc.kernels.sampling import Recorder
 
     Floats = NDArray[np.float64]
+
+WHY = {  # a case cannot continue
+    0: "the motion diverges",
+    JAMMED: "friction presses a closed gap further closed (Painleve's paradox): lower the friction",
+    UNCONVERGED: "the contact forces of the shortest step were not found",
+    ENDLESS: "events follow without end",
+    SINGULAR: NO_FORCES,
+}
 
 
 class CollocationMarch(ModalMarch):
@@ -217,8 +236,13 @@ class CollocationMarch(ModalMarch):
         last = (self._memory["part"] ** np.arange(len(force))) @ force
         return np.where(self.touching(), np.maximum(last, np.finfo(float).tiny), 0.0)
 
+    @property
+    def why(self) -> str:
+        """Why the case cannot continue."""
+        return WHY[int(self._memory["why"][0])]
+
     def _unsolved(self) -> str:
-        return NO_FORCES
+        return self.why
 
     def _new_solution(self) -> Solution:
         modes = self._modes

@@ -252,7 +252,7 @@ class CollocatedMotion:
         if trail.count[FULL]:
             raise Unfollowed(f"more than {most_events} events in a revolution")
         if outcome != FINISHED:
-            raise Unfollowed("no contact forces that obey the laws were found")
+            raise Unfollowed(self.march.why)
         return trail
 
     def contact_force(self, states: int, motion: Floats) -> Floats:

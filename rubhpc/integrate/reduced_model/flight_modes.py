@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     Complexes = NDArray[np.complex128]
 
 NODES_HARD, NODES_SPRING = 4, 5
-LONGEST_PART = 64  # longest step: a revolution over this
+LONGEST_PART = 128  # longest step: a revolution over this
 SHORTEST_LEVEL = 6  # ticks of the shortest step, as a power of two
 MOST_SLOTS = 16
 RESTING = 1e-9  # of the largest exponent: smaller sums of two exponents count as zero

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import linked_sum
+from rubhpc.kernels.collocation.flight import GAP_TOLERANCE
 from rubhpc.kernels.collocation.gaps import see_gap
 from rubhpc.kernels.collocation.laws import spring_end, static_friction
 from rubhpc.kernels.collocation.observing import value_at
@@ -123,11 +124,12 @@ def first_event(bodies: Bodies, nodes: Nodes, state: Ints, solution: Solution) -
     place, pair, kind = NO_ROOT, -1, NORMAL
     for i in range(state.size):
         values, begin = event[i, NORMAL], 0.0
-        is_opening = solution.seen[i * s, RATE] > 0.0 or values[1] > values[0]
+        least = values[0] - GAP_TOLERANCE  # lower, a gap has closed; so it does not where rounding opens it
+        is_opening = solution.seen[i * s, RATE] > 0.0 or values[1] > least
         if state[i] == OPEN and values[0] <= 0.0 and is_opening:
             # Closed within tolerance, and opening: no event before it has opened, or comes back.
             k = 1
-            while k < s and values[k] <= 0.0 and solution.seen[i * s + k, RATE] >= 0.0:
+            while k < s and values[k] <= 0.0 and (solution.seen[i * s + k, RATE] >= 0.0 or values[k] > least):
                 k += 1
             if k == s:
                 continue

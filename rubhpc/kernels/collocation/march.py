@@ -43,13 +43,17 @@ from rubhpc.kernels.collocation.observing import (
 )
 from rubhpc.kernels.collocation.structures import (
     BACKWARD,
+    ENDLESS,
     FORWARD,
     FRICTION,
+    JAMMED,
     NORMAL,
     OPEN,
     RATE,
+    SINGULAR,
     SLIP,
     STICKING,
+    UNCONVERGED,
     Bodies,
     CaseState,
     Memory,
@@ -179,11 +183,8 @@ def take_event(
     case: CaseState,
     solution: Solution,
     seen: Seen,
-) -> bool:
-    """Take an event of a pair: its new state, impulses, and the pairs that may then stick (`waiting`).
-
-    False where a force would press a gap closed that it should open.
-    """
+) -> None:
+    """Take an event of a pair: its new state, impulses, and the pairs that may then stick (`waiting`)."""
     s, state, x = nodes.at.size, case.state, case.x
     see_start(bodies, x, solution)
     was_alone = True
@@ -199,21 +200,21 @@ def take_event(
             memory.scale = LEAST_SCALE
         if is_recorded:
             seen.measured.accumulator.n_contact[pair] += 1
-        if bodies.normal_law[pair] == LAGRANGE and not strike(
-            bodies,
-            nodes,
-            clock,
-            pair,
-            acceleration,
-            is_recorded,
-            accuracy,
-            progress,
-            memory,
-            case,
-            solution,
-            seen,
-        ):
-            return False
+        if bodies.normal_law[pair] == LAGRANGE:
+            strike(
+                bodies,
+                nodes,
+                clock,
+                pair,
+                acceleration,
+                is_recorded,
+                accuracy,
+                progress,
+                memory,
+                case,
+                solution,
+                seen,
+            )
         memory.slot = lowest
         if case.lasting[pair] > 0.0:
             memory.slot = slot_within(tables, BEGINNING * case.lasting[pair])
@@ -235,7 +236,6 @@ def take_event(
         state[pair] = STICKING
         memory.slot = max(memory.slot - 4, lowest)
     memory.slot = min(memory.slot, top)
-    return True
 
 
 @linked_sum
@@ -252,7 +252,7 @@ def strike(
     case: CaseState,
     solution: Solution,
     seen: Seen,
-) -> bool:
+) -> None:
     """Take the impact of a hard pair that touches, with the impulses of the closed ones.
 
     Rebounds end where no flight is seen: below a share, the accuracy, of the fastest approach, or within a
@@ -278,8 +278,6 @@ def strike(
         if not solution.touching[i]:
             continue
         see_rates(bodies, s, i, solution)
-        if is_jammed(bodies, s, i, FORWARD, solution):
-            return False
         if not solution.bound[i] and (solution.impulse[i, NORMAL] == 0.0 or bodies.restitution[i] > 0.0):
             rate = solution.seen[i * s, RATE]
             if rate > PARTED * (bodies.rim_speed[i] + approach) + 1e-12:
@@ -292,7 +290,6 @@ def strike(
         solution.waiting[i] = bodies.is_sticky
     if is_recorded:
         record_impulses(bodies, s, clock, progress, solution, seen)
-    return True
 
 
 @linked_sum
@@ -333,6 +330,15 @@ def bind_pairs(
 
 
 @linked_sum
+def acceleration_of(nodes: Nodes, step: float, seen: Floats) -> float:
+    """Largest mean acceleration (m/s2) of a gap in a step, from its rates at the nodes."""
+    largest = 0.0
+    for k in range(1, nodes.at.size):
+        largest = max(largest, abs(seen[k, RATE] - seen[0, RATE]) / (nodes.at[k] * step))
+    return largest
+
+
+@linked_sum
 def begin_trial(bodies: Bodies, s: int, i: int, is_still: bool, case: CaseState, solution: Solution) -> int:
     """Return the state that is tried first for a pair that may stick."""
     see_start(bodies, case.x, solution)
@@ -341,6 +347,17 @@ def begin_trial(bodies: Bodies, s: int, i: int, is_still: bool, case: CaseState,
     if abs(slip) > NO_SLIP and not is_still:
         return FORWARD if slip > 0.0 else BACKWARD
     return STICKING
+
+
+@linked_sum
+def why_forceless(bodies: Bodies, s: int, state: Ints, solution: Solution) -> int:
+    """Find the forces `instant` at the local motions `start`; returns why there are none, or 0."""
+    if not find_forces(bodies, s, state, solution, solution.instant):
+        return SINGULAR
+    for i in range(state.size):
+        if is_jammed(bodies, s, i, state[i], solution):
+            return JAMMED
+    return 0
 
 
 @linked_sum
@@ -411,13 +428,15 @@ def advance_by_collocation(
                         trail,
                     )
                 if not is_carried:
+                    memory.why = SINGULAR
                     return CONTACT_UNSOLVED
                 approach = (
                     np.nan if kind == FRICTION or is_release else trail.approach[trail.approach.size - 1]
                 )
                 note_event(pair, kind, trail.state[pair], state[pair], progress.tick, approach, trail)
             see_start(bodies, x, solution)
-            if not find_forces(bodies, s, state, solution, solution.instant):
+            memory.why = why_forceless(bodies, s, state, solution)
+            if memory.why != 0:
                 return CONTACT_UNSOLVED
             hold_forces(solution.instant, case.force)
             memory.length, todo = 0, STEPPING
@@ -444,6 +463,7 @@ def advance_by_collocation(
                 carry_freely(bodies.n_complex, solution.turn, trail)
             progress.tick, kind = tick, NORMAL
             if pair == LOST:
+                memory.why = ENDLESS
                 return DIVERGED if is_diverged(bodies, x) else CONTACT_UNSOLVED
             if pair < 0:
                 continue
@@ -462,7 +482,8 @@ def advance_by_collocation(
                     first_tried, attempt = tried, 0
                 state[trial], slot = tried, 0
                 see_start(bodies, x, solution)
-                if not find_forces(bodies, s, state, solution, solution.instant):
+                memory.why = why_forceless(bodies, s, state, solution)
+                if memory.why != 0:
                     return CONTACT_UNSOLVED
                 hold_forces(solution.instant, solution.guess)
             else:
@@ -498,6 +519,7 @@ def advance_by_collocation(
             if todo == TRYING:
                 solution.waiting[trial] = False
                 if n_iteration < 0:
+                    memory.why = UNCONVERGED
                     return CONTACT_UNSOLVED
                 fill_events(bodies, nodes, state, solution.guess, accuracy, solution)
                 pressed, held, along = 0.0, 0.0, 0.0
@@ -550,6 +572,9 @@ def advance_by_collocation(
                         memory.length = 0
                     continue
                 if n_iteration < 0:
+                    see_start(bodies, x, solution)
+                    why = why_forceless(bodies, s, state, solution)
+                    memory.why = UNCONVERGED if why == 0 else why
                     return CONTACT_UNSOLVED
             fill_events(bodies, nodes, state, solution.guess, accuracy, solution)
             place, pair, kind = first_event(bodies, nodes, state, solution)
@@ -560,6 +585,10 @@ def advance_by_collocation(
             taken = whole
             if place <= 1.0:
                 taken = int(place * whole + 0.5)
+                if state[pair] == OPEN:
+                    acceleration = acceleration_of(nodes, step, solution.seen[pair * s : pair * s + s])
+                    if solution.seen[pair * s, RATE] > 0.0:
+                        taken = max(taken, 1)  # what opens does not touch at once: such touches have no end
             else:
                 pair = -1
             if progress.tick + taken > last_tick:
@@ -621,6 +650,7 @@ def advance_by_collocation(
         if progress.tick == memory.event_tick:
             memory.n_at_once += 1
             if memory.n_at_once > MOST_AT_ONCE * (1 + state.size):
+                memory.why = ENDLESS
                 return CONTACT_UNSOLVED
         else:
             memory.event_tick, memory.n_at_once = progress.tick, 0
@@ -636,7 +666,7 @@ def advance_by_collocation(
             see_rates(bodies, s, pair, solution)
             trail.approach[trail.approach.size - 1] = -solution.seen[pair * s, RATE]
         clear_impulses(solution.impulse)
-        if not take_event(
+        take_event(
             bodies,
             nodes,
             tables,
@@ -651,13 +681,13 @@ def advance_by_collocation(
             case,
             solution,
             seen,
-        ):
-            return CONTACT_UNSOLVED
+        )
         todo, trial = TRYING, -1
     is_last = progress.tick == clock.n_sample << clock.sample_level
     if is_recorded and is_last and progress.tick == progress.next_sample << clock.sample_level:
         see_start(bodies, x, solution)
         if not find_forces(bodies, s, state, solution, solution.instant):
+            memory.why = SINGULAR
             return CONTACT_UNSOLVED
         fill_instant_load(bodies, s, solution)
         record_instant(bodies, signals, clock, case.force, x, progress, seen, solution.begun)

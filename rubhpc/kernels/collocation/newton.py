@@ -267,8 +267,11 @@ def fill_residual(
         row += s
         if state[i] == STICKING:
             for k in range(1, s):
-                path = seen[k, TURNED] + bodies.rim_speed[i] * nodes.at[k] * step - fade[k, 1] * first[SLIP]
-                if not is_hard:
+                at = nodes.at[k]
+                path = seen[k, TURNED] + bodies.rim_speed[i] * at * step - fade[k, 1] * first[SLIP]
+                if is_hard:  # the small error of a gap changes evenly
+                    path -= step * at * (first[WIDENED] + 0.5 * at * (end[WIDENED] - first[WIDENED]))
+                else:
                     for j in range(s):
                         path -= step * nodes.integral[k, j] * seen[j, WIDENED]
                 residual[row + k - 1] = path
@@ -468,8 +471,10 @@ def change_residual(
     row += s
     if state[i] == STICKING:
         for k in range(1, s):
-            path = changed[k, TURNED] - first[TURNED] - fade[k, 1] * first[SLIP]
-            if not is_hard:
+            at, path = nodes.at[k], changed[k, TURNED] - first[TURNED] - fade[k, 1] * first[SLIP]
+            if is_hard:
+                path -= step * at * (first[WIDENED] + 0.5 * at * (end[WIDENED] - first[WIDENED]))
+            else:
                 for j in range(s):
                     path -= step * nodes.integral[k, j] * changed[j, WIDENED]
             target[row + k - 1] = path

@@ -26,6 +26,7 @@ ALONG, ACROSS, TWIST, BENDING = range(4)
 FIXED, ROUND = range(2)  # gap: along the axis of the stator, or along the line of centres
 OPEN, FORWARD, BACKWARD, STICKING = 0, 1, -1, 2  # state of a pair; slip is positive in steady sliding
 NORMAL, FRICTION = range(2)  # force of a pair, and event of a pair
+JAMMED, UNCONVERGED, ENDLESS, SINGULAR = range(1, 5)  # why a case cannot continue (`Memory.why`)
 
 
 class Nodes(Struct):
@@ -165,6 +166,7 @@ class Memory(Protocol):
     is_new: int  # what is to be found as a case begins: `march.KNOWN`
     least: float  # m/s, rate of approach below which the last impact had no restitution
     has_impulses: int  # whether the last event had impulses
+    why: int  # why the case cannot continue, such as JAMMED
 
 
 _RECORD = np.dtype(

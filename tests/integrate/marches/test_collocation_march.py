@@ -7,6 +7,7 @@ import corpus
 import numpy as np
 import pytest
 from closed_form import read_rig, run_up, simulate
+from contact_answers import masses
 from independent_contact import run
 from record_distance import MOTIONS
 from reference_bodies import squared_slope
@@ -21,7 +22,7 @@ from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.scheme import Scheme
 from rubhpc.recent import forget
 from rubhpc.rig.reading import with_keys
-from rubhpc.rig.stators import LumpedStator
+from rubhpc.rig.stators import LumpedStator, MatrixStator
 
 RUB = {"speed": 170.0, "clearance": "80 um", "friction": 0.2, "transient": 0, "revolutions": 2}
 CLOSE = RUB | {"clearance": "40 um"}
@@ -291,6 +292,44 @@ def test_elastic_impacts_keep_the_energy():
     assert record.contacts_per_revolution == pytest.approx([2 * math.pi / 3 / 4e-2] * 2, rel=0.02)
     energy = 0.5 * record.final.rotor_velocity[0] ** 2 + 2.0 * record.final.rotor_displacement[0] ** 2
     assert energy == pytest.approx(0.5, rel=1e-10)
+
+
+@pytest.mark.parametrize("restitution", [0.2, 0.5, 0.9])
+def test_rebounds_beside_closed_pairs_have_an_end(restitution):
+    """A ring in which one pair bounces while others are pressed."""
+    rig = masses(8, stiffness=1e6, radius=0.06)
+    given = {"speed_ratio": 1.5, "clearance": 70e-6, "friction": 0.3, "friction_law": "coulomb"}
+    given |= {"normal": "updated", "restitution": restitution, "transient": 0, "revolutions": 1}
+    found, fine = (simulate(rig, **given, accuracy=accuracy) for accuracy in (1e-3, 1e-5))
+    assert found.reason == fine.reason == ""
+    assert found.energy_residual < 1e-4
+    assert found.contact_impulse == pytest.approx(fine.contact_impulse, abs=1e-3 * fine.contact_impulse.max())
+    assert found.peak_contact_force == pytest.approx(
+        fine.peak_contact_force, abs=1e-3 * fine.peak_contact_force.max()
+    )
+
+
+def test_a_pair_sticks_on_a_gap_that_is_not_quite_closed():
+    """What its small error moves a normal by is no slip: stick and slip alternated at one instant."""
+    rig = with_keys(read_rig("mokhtar2017"), {"stator.geometry": "second_order", "stator.radius": 0.004})
+    given = {"speed_ratio": 1.3, "clearance": 84e-6, "friction": 0.5, "friction_law": "coulomb"}
+    record = simulate(rig, **given, normal="updated", transient=0, revolutions=16)
+    assert record.reason == ""
+    assert record.steps < 200 * 16
+
+
+@pytest.mark.parametrize("friction_law", ["sliding", "coulomb"])
+def test_friction_that_wedges_a_stator_ends_a_case(friction_law):
+    """A tip that turns in as it is dragged along (Painleve 1895): at a friction above 1/3."""
+    lean = MatrixStator(
+        node=8, mass=[[1e-2, 3e-3], [3e-3, 1e-3]], damping=np.eye(2), stiffness=np.diag([1e6, 1e5]),
+        degrees=("axial", "lateral"),
+    )  # fmt: skip
+    rig = replace(read_rig("mokhtar2017"), stator=(lean,))
+    given = {"speed_ratio": 0.75, "clearance": 84e-6, "normal": "updated", "friction_law": friction_law}
+    given |= {"transient": 0, "revolutions": 3}
+    assert simulate(rig, **given, friction=0.2).peak_contact_force[0] > 10.0
+    assert "Painleve" in simulate(rig, **given, friction=0.8).reason
 
 
 def test_cases_before_change_no_bit():
