@@ -17,13 +17,11 @@ from rubhpc.integrate.compilation import (
     NEIGHBOURS,
     PERIODIC,
     RUN_UPS,
-    STICK,
     seconds_compiling,
 )
 from rubhpc.integrate.lyapunov import Growth, Marches
 from rubhpc.integrate.marched_record import Marched, march_record, repeat_period
 from rubhpc.integrate.marches.central_difference import CentralDifferenceMarch
-from rubhpc.integrate.marches.closed_form import closed_form_march
 from rubhpc.integrate.marches.collocation import CollocationMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.marches.met_modes import NoClosedForm
@@ -40,6 +38,7 @@ from rubhpc.integrate.measuring.samples import (
 )
 from rubhpc.integrate.measuring.settling import is_steady
 from rubhpc.integrate.modal_setup import ModalSetup
+from rubhpc.integrate.overlaps import with_overlap
 from rubhpc.integrate.periodic_motions.collocated_motion import followed_motion
 from rubhpc.integrate.periodic_motions.direct import pass_directly
 from rubhpc.integrate.periodic_motions.lyapunov_spectrum import spectrum_of
@@ -48,11 +47,9 @@ from rubhpc.integrate.periodic_motions.proof import Solver
 from rubhpc.integrate.periodic_motions.solved_motion import SolvedMotion, solved_motions
 from rubhpc.integrate.record import Record, State
 from rubhpc.integrate.scheme import Scheme
-from rubhpc.integrate.start import fit_to_gaps, start_of, with_overlap
+from rubhpc.integrate.start import fit_to_gaps, start_of
 from rubhpc.integrate.tangent_motion import TangentMotion
 from rubhpc.integrate.transient import pass_revolutions, pass_transient
-from rubhpc.kernels._jit import plain
-from rubhpc.kernels.laws import is_set_valued
 from rubhpc.kernels.trail import BROKEN
 from rubhpc.schema import DONE, REGIME, SECTION_NAMES, lyapunov_variables
 from rubhpc.spectra import amplitude_spectrum
@@ -84,12 +81,6 @@ MARCHES: dict[Scheme, Callable[..., March]] = {
 }
 
 _spare: list[Trail] = []  # arrays of the last case, unless another one uses them
-
-
-def march_of(scheme: Scheme, setup: Setup) -> Callable[..., March]:
-    """Return the constructor of the march of a scheme."""
-    march = MARCHES[scheme]
-    return closed_form_march(setup) if isinstance(setup, ModalSetup) and march is EventDrivenMarch else march
 
 
 def run_case(
@@ -137,9 +128,7 @@ def run_case(
                 check()
                 say(reached(revolution))
 
-            march = march_of(scheme, setup)(
-                setup, clearance, friction, state, None if check is None else look
-            )
+            march = MARCHES[scheme](setup, clearance, friction, state, None if check is None else look)
             return march
 
         return start
@@ -156,7 +145,7 @@ def run_case(
     record.measures["modal_error"] = setup.modal_error if isinstance(setup, ModalSetup) else math.nan
     if isinstance(setup, ModalSetup) and np.any(record.measures["contact_fraction"] != 0.0):
         record = replace(record, advice=setup.modes_missing)  # without contact no mode is excited
-    if scheme is not Scheme.EVENT_DRIVEN or setup.law.stiffness > 0.0:
+    if scheme is not Scheme.EVENT_DRIVEN:
         record = replace(record, final=with_overlap(record.final, setup, clearance))
     record.measures["wall_time"] = time.perf_counter() - seconds_compiling() - began
     return record
@@ -176,7 +165,7 @@ def kernel_sets(setup: Setup, *, changes_speed: bool = False) -> set[str]:
     sets = {COMMON, RUN_UPS} if changes_speed else {COMMON, NEIGHBOURS}
     if setup.scheme is Scheme.COLLOCATION:
         return sets | {COLLOCATION}
-    return sets | {PERIODIC} | ({STICK} if plain(is_set_valued)(setup.law) else set())
+    return sets | {PERIODIC}
 
 
 def compile_kernels(
@@ -198,7 +187,7 @@ def compile_kernels(
     if isinstance(setup, ModalSetup) and setup.scheme is Scheme.EVENT_DRIVEN and record.status == DONE:
         Solver(setup, clearance, friction, record.final)(1)
         if all_sets:
-            start = partial(closed_form_march(setup), setup, clearance, friction, check=check)
+            start = partial(EventDrivenMarch, setup, clearance, friction, check=check)
             TangentMotion(start, record.final, setup, recording).part(1)
 
 
@@ -408,7 +397,7 @@ def _kept(march: EventDrivenMarch) -> Trail | None:
         trail = _spare.pop()
     except IndexError:
         return None
-    width = trail.begun.shape[2], trail.given.shape[2]
+    width = trail.begun.shape[2], trail.given.shape[1]
     return trail if width == march.width else None
 
 

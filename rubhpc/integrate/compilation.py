@@ -17,15 +17,13 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
 COMMON = ""
-STICK, COLLOCATION = "for friction with stick", "for curved gaps and any law"
+COLLOCATION = "for curved gaps and any law"
 PERIODIC = "for periodic motions"
 RUN_UPS = "for run-ups"
 NEIGHBOURS = "for neighbouring motions, which distinguish chaos from order"
 # Sets of kernels, each announced, and compiled when a case first needs it -> seconds that it takes, about.
-_SECONDS = {COMMON: 10, STICK: 15, COLLOCATION: 15, PERIODIC: 10, RUN_UPS: 10, NEIGHBOURS: 10}
+_SECONDS = {COMMON: 10, COLLOCATION: 15, PERIODIC: 10, RUN_UPS: 10, NEIGHBOURS: 10}
 _SETS = {  # kernel -> its set; all others are common
-    "advance_friction": STICK,
-    "change_states": STICK,
     "advance_by_collocation": COLLOCATION,
     "follow_revolutions": PERIODIC,
     "search_period": PERIODIC,

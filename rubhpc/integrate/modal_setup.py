@@ -3,27 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rubhpc.integrate.measuring.divergence import energy_limit
-from rubhpc.integrate.reduced_model.contact_mode import (
-    ContactMode,
-    SlidingPairs,
-    confine,
-    solve_contact_mode,
-)
+from rubhpc.integrate.reduced_model.contact_mode import ContactMode, confine, solve_contact_mode
 from rubhpc.integrate.reduced_model.flight_modes import FlightModes
-from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs, solve_friction_mode
-from rubhpc.integrate.reduced_model.mode_library import (
-    ModeLibrary,
-    width_without_modes,
-)
-from rubhpc.integrate.reduced_model.mode_tables import energies_of, tabulate
+from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
 from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions, kernel_bodies
 from rubhpc.integrate.reduced_model.system_modes import KeptParts, solve_parts
 from rubhpc.integrate.reduced_model.touching import OpenBodies, open_bodies
@@ -45,12 +34,11 @@ if TYPE_CHECKING:
     from rubhpc.fem.free_spin import FreeSpin
     from rubhpc.fem.model import Model
     from rubhpc.integrate.reduced_model.system_modes import Solved
-    from rubhpc.kernels.contact_modes import ModeTables, Reduced
+    from rubhpc.kernels.contact_modes import Reduced
     from rubhpc.kernels.laws import Law
 
     Floats = NDArray[np.float64]
 
-Kind = Literal["sliding", "penalty", "friction"]  # of contact modes
 FINEST_TICK = 1.9e-10  # s
 CONTACT_STEPS = 1024  # per revolution, at least, while recording a contact
 LONGEST_TURN = FINEST_TICK * 2**46  # s, 3.7 hours: 64 bits count the ticks of a hundred thousand revolutions
@@ -73,8 +61,7 @@ class ModalSetup:
     accuracy: float = 1e-3  # relative, of the modes kept, and of loads where gaps are curved
     free_spin: FreeSpin | None = None  # of a driven rotor
     is_measured: bool = True  # False: tables have no outputs and energies
-    _libraries: dict[tuple[Kind, float], ModeLibrary] = field(default_factory=dict)
-    _open_tables: dict[float, ModeTables] = field(default_factory=dict)
+    _libraries: dict[float, ModeLibrary] = field(default_factory=dict)
 
     @cached_property
     def energy_limit(self) -> float:
@@ -176,45 +163,20 @@ class ModalSetup:
 
     def library(self, friction: float) -> ModeLibrary:
         """Contact modes of a friction, shared by its cases."""
-        return self._find("sliding", friction)
-
-    def penalty_library(self, friction: float) -> ModeLibrary:
-        """The same under a penalty."""
-        return self._find("penalty", friction)
-
-    def friction_library(self, friction: float) -> ModeLibrary:
-        """Contact modes of a friction whose slip may reverse, shared by its cases."""
-        return self._find("friction", friction)
-
-    def _find(self, kind: Kind, friction: float) -> ModeLibrary:
-        if (kind, friction) not in self._libraries:
-            opened, known, among = self._opened, self._known_of_ring, self._among
-            pairs = self._pairs(kind, friction)
-            if isinstance(pairs, FrictionPairs):
-                known = self._known
-                opened = solve_friction_mode(self.reduced, pairs, 0, known)
-                among = open_bodies(self.reduced, self.model, opened)
-            self._libraries[kind, friction] = ModeLibrary(
+        if friction not in self._libraries:
+            self._libraries[friction] = ModeLibrary(
                 self.reduced,
                 self.model,
                 friction,
-                pairs=pairs,
-                opened=opened,
-                known=known,
+                opened=self._opened,
+                known=self._known_of_ring,
                 tick=self.tick,
                 sample_level=self.sample_level,
                 n_level=self.n_level,
                 is_measured=self.is_measured,
-                among=among,
+                among=self._among,
             )
-        return self._libraries[kind, friction]
-
-    def _pairs(self, kind: Kind, friction: float) -> SlidingPairs | FrictionPairs:
-        """The pairs of the contact modes of a kind and a friction."""
-        if kind == "friction":
-            return self.friction_pairs(friction)
-        along = directions(self.reduced, self.model, friction)[:2]
-        return SlidingPairs(*along, *((self.law.stiffness, self.law.damping) if kind == "penalty" else ()))
+        return self._libraries[friction]
 
     @cached_property
     def _among(self) -> OpenBodies | None:
@@ -233,68 +195,18 @@ class ModalSetup:
         """The same for several stators; for one stator nothing is looked up."""
         return self._known if len(self.model.stators) > 1 else {}
 
-    def friction_pairs(self, friction: float) -> FrictionPairs:
-        """The pairs of a friction."""
-        gap_jacobian, _, slip = directions(self.reduced, self.model, friction)
-        radius = np.array([stator.radius for stator in self.model.stators])
-        return FrictionPairs(
-            gap_jacobian=gap_jacobian,
-            friction_direction=-slip,
-            friction=friction,
-            static_ratio=self.law.static_friction_ratio,
-            rim_speed=radius * abs(self.spin),
-            stiffness=self.law.stiffness,
-            damping=self.law.damping,
-        )
-
     @property
     def n_byte(self) -> dict[float, int]:
         """Memory of the tables of contact modes, bytes, by friction."""
-        found: Counter[float] = Counter()
-        for (_, friction), library in self._libraries.items():
-            found[friction] += library.n_byte
-        return found
-
-    @property
-    def n_byte_of_parts(self) -> int:
-        """Memory of the parts that contact modes of a ring share, bytes."""
-        known = vars(self).get("_known")
-        return known.n_byte if isinstance(known, KeptParts) else 0
+        return {friction: library.n_byte for friction, library in self._libraries.items()}
 
     def n_solved(self, friction: float) -> int:
         """Number of contact modes of a friction that were solved, including repeated ones."""
-        return sum(library.n_solved for (_, of), library in self._libraries.items() if of == friction)
+        return self._libraries[friction].n_solved if friction in self._libraries else 0
 
     def forget(self, friction: float) -> None:
         """Free the contact modes of a friction."""
-        self._open_tables.pop(friction, None)
         self._bodies.pop(friction, None)
-        for key in [key for key in self._libraries if key[1] == friction]:
-            del self._libraries[key]
+        self._libraries.pop(friction, None)
         if not self._libraries:  # and the shared parts, except those with every pair open
             vars(self).pop("_known", None)
-
-    def open_tables(self, friction: float) -> ModeTables:
-        """Tables of the open mode alone, with the width of the friction's library."""
-        if friction not in self._open_tables:
-            library = self._libraries.get(("sliding", friction))
-            width = (
-                library.width
-                if library
-                else width_without_modes(self.reduced, self.model, friction, self._opened.exponent.size)
-            )
-            if self._among is None:
-                energies = energies_of(self._opened, self.reduced, None, width)
-            else:
-                energies = self._among.opened_energies.padded(width)
-            self._open_tables[friction] = tabulate(
-                self._opened,
-                self.reduced,
-                directions(self.reduced, self.model, friction)[2],
-                energies=energies,
-                width=width,
-                tick=self.tick,
-                sample_level=self.sample_level,
-                n_level=self.n_level,
-            )
-        return self._open_tables[friction]

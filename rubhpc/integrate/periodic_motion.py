@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.errors import InputError, NoPeriodicMotion
-from rubhpc.integrate.case import march_of, run_case
+from rubhpc.integrate.case import MARCHES, run_case
 from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.periodic_motions.collocated_motion import CollocatedMotion, followed_motion
@@ -183,7 +183,7 @@ def _search(
     reason = ""
     for span in (first, *SPANS):
         if span:
-            march = march_of(setup.scheme, setup)(setup, clearance, friction, state, None)
+            march = MARCHES[setup.scheme](setup, clearance, friction, state, None)
             ended = pass_revolutions(march, recording, span)
             if ended is not None:
                 reason = ended

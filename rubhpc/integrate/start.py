@@ -15,10 +15,9 @@ from rubhpc.fem.response import check_response_node, steady_response
 from rubhpc.fem.stability import instability_message
 from rubhpc.fem.statics import rigid_body_row
 from rubhpc.integrate.modal_setup import ModalSetup
-from rubhpc.integrate.packing import degrees_of
+from rubhpc.integrate.overlaps import gaps, with_overlap
 from rubhpc.integrate.record import State
 from rubhpc.kernels.complementarity import UNSOLVED
-from rubhpc.kernels.contact_pairs import AXIAL, V, W, normal_and_gap
 from rubhpc.kernels.laws import HERTZ
 from rubhpc.kernels.lemke import solve_lemke
 from rubhpc.study.initial import CONTACT_FREE, REST
@@ -133,34 +132,6 @@ def compression(law: Law, force: Floats) -> Floats:
             force > 0.0, law.stiffness ** (-2 / 3) * np.maximum(force, LEAST_FORCE) ** (-1 / 3), 0.0
         )
     return np.full(force.size, 1.0 / law.stiffness)
-
-
-def with_overlap(state: State, setup: Setup, clearance: float) -> State:
-    """Return the final state of a case with the overlap of its gaps."""
-    gap, _ = gaps(state.displacement, setup, clearance)
-    return replace(state, overlap=np.maximum(-gap, 0.0))
-
-
-def gaps(displacement: Floats, setup: Setup, clearance: float) -> tuple[Floats, Floats]:
-    """Gap of each pair (q,), m, and its change with each degree of the bodies (q, n_dof)."""
-    model = setup.model
-    degree = degrees_of(model)
-    gap, gap_jacobian = np.zeros(len(degree)), np.zeros((len(degree), displacement.size))
-    for i, (stator, rows) in enumerate(zip(model.stators, degree, strict=True)):
-        at = np.where(rows >= 0, displacement[rows], 0.0)
-        at[[V, W]] -= stator.centre
-        body = slice(model.stator_start[i], model.stator_start[i] + stator.body.n_dof)
-        drawn = np.zeros(stator.body.n_dof)
-        if stator.squared_slope is not None:
-            drawn = stator.squared_slope @ displacement[body]
-            at[AXIAL] += 0.5 * displacement[body] @ drawn
-        ey, ez = float(np.cos(stator.angle)), float(np.sin(stator.angle))
-        reach = clearance + stator.clearance_offset
-        ny, nz, gap[i] = normal_and_gap(ey, ez, stator.radius, reach, 0.0, setup.is_updated, at)
-        change = np.array([-ny, -nz, 0.0, ny * ey + nz * ez, ny * -ez + nz * ey])
-        gap_jacobian[i, rows[rows >= 0]] = change[rows >= 0]
-        gap_jacobian[i, body] += change[AXIAL] * drawn
-    return gap, gap_jacobian
 
 
 def _as_seen(displacement: Floats, setup: Setup) -> Floats:

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.integrate.lyapunov import N_ALIGNING, SPAN, Marches, count_followed
-from rubhpc.integrate.marches.friction import FrictionMarch
 from rubhpc.integrate.measuring.regimes import N_ALL, N_FIRST, N_MOST
 from rubhpc.integrate.transient import pass_revolutions
 from rubhpc.kernels.tangent import ALL_CARRIED, PIECE, TrailModes, carry_along, new_tangent
@@ -181,7 +180,6 @@ class TangentMotion:
                 march.tables,
                 march.bodies,
                 clock.spin,
-                clock.tick,
                 first,
                 clock.samples_per_revolution << clock.sample_level,
                 trail,
@@ -209,10 +207,7 @@ class _ModesOfTrail:
             of_piece.reshape(-1),
             np.full(k, -1),
             np.zeros((k, 2, m)),
-            np.zeros((k, m)),
             np.zeros(k, dtype=np.int64),
-            isinstance(march, FrictionMarch),
-            march.setup.law.static_friction_ratio == 1.0,
         )
 
     def placed(self) -> TrailModes:
@@ -222,8 +217,7 @@ class _ModesOfTrail:
         for i, states in enumerate(self._states):
             modes.place[i] = place = place_of.get(states, -1)
             if place >= 0 and not self._is_read[i]:
-                modes.exponent[i], modes.drift[i] = march.exponents(states)
-                modes.opened[i] = march.gaps_watched(states)
+                modes.exponent[i], modes.opened[i] = march.exponents(states), ~states
                 self._is_read[i] = True
         return modes
 
@@ -239,9 +233,9 @@ def _motion_at(trail: Trail, march: EventDrivenMarch, tick: int) -> Floats:
     states = int(trail.states[piece])
     if states not in march.tables.mask:
         march.find(states)
-    tables, (exponent, drift) = march.tables, march.exponents(states)
+    tables, exponent = march.tables, march.exponents(states)
     time = (tick - int(trail.tick[piece - 1] if piece > 0 else 0)) * march.clock.tick
     begun, mode = trail.begun[piece], tables.mask.tolist().index(states)
-    z = (begun[0] + 1j * begun[1]) * np.exp(time * (exponent[0] + 1j * exponent[1])) + time * drift
+    z = (begun[0] + 1j * begun[1]) * np.exp(time * (exponent[0] + 1j * exponent[1]))
     motion: Floats = tables.motion_re[mode] @ z.real - tables.motion_im[mode] @ z.imag
     return motion

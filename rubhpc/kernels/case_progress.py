@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +10,6 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import jit_sum
 from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.contact_pairs import rim_sense
-
-if TYPE_CHECKING:
-    from rubhpc.kernels.contact_modes import ModeTables
 
 Floats = NDArray[np.float64]
 
@@ -104,22 +101,6 @@ def restart_clock(record: Any, tick: int, sample: int, *, is_recorded: bool) -> 
 def begin_in(record: Any, mode: int) -> None:
     """Set the contact mode of a bare record, whose modal coordinates are those of that mode."""
     record["mode"] = mode
-
-
-def ask_for(progress: Progress, mask: int) -> None:
-    """Request the contact mode with the pairs of `mask` closed, to be entered from the reduced motion."""
-    progress.wanted = mask
-
-
-def follow(progress: Progress, other: Progress) -> None:
-    """Take the progress of another integration of the same case; no energies are to be added."""
-    progress.tick, progress.next_sample, progress.n_step = other.tick, other.next_sample, other.n_step
-    progress.counted_from, progress.n_event, progress.energy_from = other.tick, 0, NONE
-
-
-def closed_pairs(progress: Progress, tables: ModeTables) -> int:
-    """Set of the closed pairs, bit i for pair i."""
-    return int(tables.mask[progress.mode])
 
 
 @jit_sum

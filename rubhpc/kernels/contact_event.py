@@ -19,7 +19,6 @@ from rubhpc.kernels.contact_modes import FORCED_LEVEL, ModeTables, Reduced
 from rubhpc.kernels.event_steps import enter_wanted, leave_mode, record_event, record_touch
 from rubhpc.kernels.measuring import begin_contact, begin_span
 from rubhpc.kernels.mode_change import EventWork, change_contacts, product
-from rubhpc.kernels.penalty_events import change_pressed
 from rubhpc.kernels.sampling import Measured, Recorder  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.trail import Trail, note_after, note_event, note_piece
 
@@ -80,28 +79,15 @@ def take_event(
     note_event(work.trail, progress.tick, crossing)
     cosine, sine = shaft_turn(clock, progress.tick)
     moment = (1 << FORCED_LEVEL) * clock.tick
-    if reduced.spring > 0.0:
-        progress.wanted = change_pressed(reduced, closed, crossing, motion)
-    else:
-        progress.wanted = change_contacts(
-            reduced,
-            closed,
-            crossing,
-            spin,
-            moment,
-            cosine,
-            sine,
-            motion,
-            is_recorded,
-            work,
-            accumulator,
-        )
+    progress.wanted = change_contacts(
+        reduced, closed, crossing, spin, moment, cosine, sine, motion, is_recorded, work, accumulator
+    )
     if progress.wanted < 0 or progress.n_event > MOST_EVENTS:
         return CONTACT_UNSOLVED
     if work.trail.tick.size > 0:
         for i in range(work.speed.size):
             work.speed[i] = product(reduced.gap_jacobian[i], motion[motion.size // 2 :])
-        note_after(work.trail, work.speed, work.speed, work.given)
+        note_after(work.trail, work.speed, work.given)
     if is_recorded:
         for i in range(reduced.radius.size):
             record_event(clock, progress, work.impulse, i, samples, accumulator)

@@ -21,7 +21,6 @@ SAMPLES_AT_ONCE = 8  # read from one set of modal coordinates
 BOUND_LEVEL = 3  # `ModeTables.bound` holds over 2^level samples, or the longest step where that is longer
 FORCED_LEVEL = 6  # steps of up to 2^level ticks after an event need no bound, so that time advances
 RESOLVED = 0.02  # of a signal's size: its fourth derivative times the step to the fourth
-STILL = 1e-3  # 1/s, size of an exponent up to which a coordinate has no primitive
 LANES = 8  # coordinates are used in whole vectors
 DYING = -1.0  # pace of a mode that has decayed before the first step after an event ends
 
@@ -34,18 +33,13 @@ class ModeTables(Struct):
     pair, m.
     """
 
-    mask: Ints  # (p,), bit i set: pair i is closed; other states of a pair have bits of their own
+    mask: Ints  # (p,), set of closed pairs, bit i of pair i
     n_eigenmode: Ints  # (p,), number of eigenmodes
     switch_re: Floats  # (p, q, m), gap of an open pair, m; force of a closed one, N
     switch_im: Floats
     rate_re: Floats  # (p, q, m), its time derivative
     rate_im: Floats
     bound: Floats  # (p, q, m), bound on its second time derivative for a unit coordinate (`BOUND_LEVEL`)
-    bend_re: Floats  # (p, q, m), its second time derivative; under set-valued friction alone, as the next
-    bend_im: Floats
-    turn: Floats  # (p, q, m), bound on its third time derivative; negative: decays within a sample
-    primitive_re: Floats  # (p, q, m), its primitive in time, zero of coordinates that have none
-    primitive_im: Floats
     pace: Floats  # (p, m), size of the exponent, 1/s, or DYING
     power_re: Floats  # (p, n_level, m), exponential of each mode over 2^level ticks
     power_im: Floats
@@ -82,8 +76,6 @@ class Reduced(Struct):
     radius: Floats  # (q,), m
     rim_speed: Floats  # (q,), of the steady spin, m/s, not negative
     restitution: float  # normal velocity after an impact over that before it
-    spring: float  # of a penalty, N/m; 0: gaps are closed by multipliers
-    damper: float  # N s/m
     clearance: Floats  # (q,), m
     translations: Floats  # (r, n), displacements that are compared with the limit
     displacement_limit: float  # m
@@ -241,9 +233,9 @@ def enter_rest(
 def used_width(tables: ModeTables, mode: int) -> int:
     """How many coordinates of a contact mode are used, in whole vectors; those behind them are zero.
 
-    Beside the eigenmodes: the unbalance response and a 1, and a clearance and a displacement of each pair.
+    Beside the eigenmodes: the unbalance response, and a clearance of each pair.
     """
-    used = tables.n_eigenmode[mode] + 2 + tables.switch_re.shape[1]
+    used = tables.n_eigenmode[mode] + 1 + tables.switch_re.shape[1]
     return int(min((used + LANES - 1) // LANES * LANES, tables.switch_re.shape[2]))
 
 

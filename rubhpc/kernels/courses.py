@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit, linked
 from rubhpc.kernels._struct import Struct
-from rubhpc.kernels.contact_modes import STILL
 
 if TYPE_CHECKING:
     from rubhpc.kernels.contact_modes import ModeTables
@@ -90,20 +89,10 @@ def follow(tables: ModeTables, mode: int, courses: Courses, place: float) -> Non
 @linked
 def follow_rates(tables: ModeTables, mode: int, exponent: Complexes, n_eigenmode: int) -> None:
     """Rates of what eigenmodes make of switch functions and slip, as their exponents are."""
-    inverse = np.zeros(n_eigenmode if tables.primitive_re.shape[1] > 0 else 0, dtype=np.complex128)
-    for k in range(inverse.size):
-        if abs(exponent[k]) > STILL:
-            inverse[k] = 1.0 / exponent[k]
     for i in range(tables.switch_re.shape[1]):
         for k in range(n_eigenmode):
             rate = complex(tables.switch_re[mode, i, k], tables.switch_im[mode, i, k]) * exponent[k]
             tables.rate_re[mode, i, k], tables.rate_im[mode, i, k] = rate.real, rate.imag
-            if i < tables.bend_re.shape[1]:
-                rate = rate * exponent[k]
-                tables.bend_re[mode, i, k], tables.bend_im[mode, i, k] = rate.real, rate.imag
-            if i < tables.primitive_re.shape[1]:
-                whole = complex(tables.switch_re[mode, i, k], tables.switch_im[mode, i, k]) * inverse[k]
-                tables.primitive_re[mode, i, k], tables.primitive_im[mode, i, k] = whole.real, whole.imag
     for i in range(tables.slip_re.shape[1]):
         for k in range(n_eigenmode):
             rate = complex(tables.slip_re[mode, i, k], tables.slip_im[mode, i, k]) * exponent[k]

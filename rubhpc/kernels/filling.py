@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit, linked, linked_sum
 from rubhpc.kernels._struct import Struct
-from rubhpc.kernels.contact_modes import STILL, ModeTables
+from rubhpc.kernels.contact_modes import ModeTables  # noqa: TC001 - part of a kernel's signature
 from rubhpc.kernels.courses import Courses, follow, follow_rates
 from rubhpc.kernels.filling_energies import Losses, fill_energies
 from rubhpc.kernels.retuning_exponentials import retune_bounds, retune_outputs, retune_powers
@@ -109,14 +109,8 @@ def fill_at(
     for i in range(tables.switch_re.shape[1]):
         switch = complex(seen[0, i], seen[1, i]) - factor * course.reaction[i]
         tables.switch_re[mode, i, m], tables.switch_im[mode, i, m] = switch.real, switch.imag
-        if i < tables.primitive_re.shape[1]:
-            whole = switch / turning if abs(turning) > STILL else 0j
-            tables.primitive_re[mode, i, m], tables.primitive_im[mode, i, m] = whole.real, whole.imag
         switch = switch * turning
         tables.rate_re[mode, i, m], tables.rate_im[mode, i, m] = switch.real, switch.imag
-        if i < tables.bend_re.shape[1]:
-            switch = switch * turning
-            tables.bend_re[mode, i, m], tables.bend_im[mode, i, m] = switch.real, switch.imag
     respond(tables.slip_re[mode], tables.slip_im[mode], shares, seen)
     for i in range(tables.slip_re.shape[1]):
         slip = complex(seen[0, i], seen[1, i])
@@ -124,7 +118,7 @@ def fill_at(
         slip = slip * turning
         tables.slip_rate_re[mode, i, m], tables.slip_rate_im[mode, i, m] = slip.real, slip.imag
     retune_powers(tables, mode, exponent, end, tick)
-    retune_bounds(tables, mode, exponent, end, tick, interval)
+    retune_bounds(tables, mode, exponent, end, tick)
     _look(course.output, moved, seen)
     for o in range(course.output.shape[0]):
         course.row[o, m] = complex(seen[0, o], seen[1, o])

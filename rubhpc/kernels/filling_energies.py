@@ -15,23 +15,16 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
-Ints = NDArray[np.int64]
 
 STEADY = 1e-13  # sum of two exponents over the greatest, below which it is zero but for rounding
 
 
 class Losses(Struct):
-    """Forces and springs of a mode that energies follow from; empty where none are asked for."""
+    """Forces of a mode that energies follow from; empty where none are asked for."""
 
     resisting_re: Floats  # (n, width), resisting forces by coordinates; those of the response are filled in
     resisting_im: Floats
     rubbed: Complexes  # (n,), what the unbalance at unit speed gives of them directly
-    half: float  # N/m, of the stiffness of springs
-    gap: Floats  # (k, n), gaps of those pressed by reduced displacements
-    clearance: Ints  # (k,), coordinates of their clearances
-    one: int  # coordinate that is 1, or -1 without set-valued friction
-    growing: Ints  # (g,), coordinates that grow
-    speed: Floats  # (g,), m/s
 
 
 @linked
@@ -57,18 +50,16 @@ def fill_energies(
     for k in range(width):
         greatest = max(greatest, abs(exponent[k]))
     least = 2.0 * STEADY * greatest
-    steady, driven, power = 0.0, 0.0, 0.0
+    steady, driven = 0.0, 0.0
     for a in range(n):
         x[a] = complex(motion_re[n + a, m], motion_im[n + a, m])
         own[a] = complex(resisted[0, a], resisted[1, a]) + factor * losses.rubbed[a]
         losses.resisting_re[a, m], losses.resisting_im[a, m] = own[a].real, own[a].imag
         steady += (x[a] * np.conj(own[a])).real
         driven += (x[a] * np.conj(factor * phasor[a])).real
-        if losses.one >= 0:
-            power += motion_re[n + a, losses.one] * losses.resisting_re[a, losses.one]
     if 2.0 * abs(turning.real) > least:  # no power of the response is steady; the forms hold it
         steady, driven = 0.0, 0.0
-    tables.steady_power[mode, 0], tables.steady_power[mode, 1] = 0.5 * steady + power, 0.5 * driven
+    tables.steady_power[mode, 0], tables.steady_power[mode, 1] = 0.5 * steady, 0.5 * driven
     for k in range(end):
         across, across_conjugate, down, down_conjugate, work, work_conjugate = 0j, 0j, 0j, 0j, 0j, 0j
         for a in range(n):
@@ -97,58 +88,6 @@ def fill_energies(
         second = 0.5 * _primitive(np.conj(factor) * work_conjugate, exponent[k] + np.conj(turning), least)
         tables.work_re[mode, 0, k], tables.work_im[mode, 0, k] = first.real, first.imag
         tables.work_re[mode, 1, k], tables.work_im[mode, 1, k] = second.real, second.imag
-    if losses.one >= 0:
-        _follow_growth(loss, losses, turning, m, x)
-    if losses.gap.shape[0] > 0:
-        _stretch_springs(loss, losses, motion_re, motion_im, m)
-
-
-@linked
-def _follow_growth(loss: Floats, losses: Losses, turning: complex, first: int, x: Complexes) -> None:
-    """Add the products of growing coordinates with the velocities `x` (n,) of the response.
-
-    `turning` (1/s) is the exponent of the response, `first` its coordinate.
-    """
-    width, one = loss.shape[0] // 2, losses.one
-    itself, conjugate = 0j, 0j
-    for g in range(losses.growing.size):
-        k = losses.growing[g]
-        speed = -losses.speed[g] / (turning * turning)
-        for a in range(x.size):
-            against = complex(losses.resisting_re[a, k], losses.resisting_im[a, k])
-            itself += speed * (x[a] * against)
-            conjugate += speed * (x[a] * np.conj(against))
-    both, apart = 0.25 * (itself + conjugate), 0.25 * (conjugate - itself)
-    for here, there, added in (
-        (first, one, both.real),
-        (first, width + one, apart.imag),
-        (width + first, one, -both.imag),
-        (width + first, width + one, apart.real),
-    ):
-        loss[here, there] += added
-        loss[there, here] += added
-
-
-@linked
-def _stretch_springs(loss: Floats, losses: Losses, motion_re: Floats, motion_im: Floats, first: int) -> None:
-    """Add the energy of springs by the response, the coordinate `first`."""
-    n_spring, n = losses.gap.shape
-    width = loss.shape[0] // 2
-    overlap = np.empty(2 * width)  # of a spring by coordinates
-    for s in range(n_spring):
-        for k in range(width):
-            re, im = 0.0, 0.0
-            for a in range(n):
-                re += losses.gap[s, a] * motion_re[a, k]
-                im += losses.gap[s, a] * motion_im[a, k]
-            overlap[k], overlap[width + k] = re, -im
-        overlap[losses.clearance[s]] += 1.0
-        for here in (first, width + first):
-            for other in range(2 * width):
-                form = losses.half * overlap[here] * overlap[other]
-                loss[here, other] += form
-                if other != first and other != width + first:
-                    loss[other, here] += form
 
 
 @linked

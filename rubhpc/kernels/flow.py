@@ -18,28 +18,26 @@ from rubhpc.kernels.contact_modes import (
 from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.cubics import turning_value
 from rubhpc.kernels.event_loop import stand_still
+from rubhpc.kernels.mode_change import GAP_TOLERANCE
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 MOST_REFINEMENTS = 30  # Newton steps to a root; two or three are usual
 SAME_TIME = 1e-14  # s, within which switch functions vanish together
 
 
 class PieceTables(Struct):
-    """Tables of a contact mode to follow a piece: m coordinates, n reduced degrees, s switch functions."""
+    """Tables of a contact mode to follow a piece: m coordinates, n reduced degrees, q pairs."""
 
-    switch_re: Floats  # (s, m), switch functions of the coordinates, real part of the product
+    closed: int  # set of closed pairs
+    switch_re: Floats  # (q, m), switch functions of the coordinates, real part of the product
     switch_im: Floats
-    rate_re: Floats  # (s, m), of their rates
+    rate_re: Floats  # (q, m), of their rates
     rate_im: Floats
-    bound: Floats  # (s, m), of their second derivatives
+    bound: Floats  # (q, m), of their second derivatives
     power_re: Floats  # (levels, m), exponentials over 2^level ticks
     power_im: Floats
     exponent: Floats  # (2, m), 1/s, real and imaginary
-    drift: Floats  # (m,), rate of coordinates that grow linearly, their unit per second
-    floor: Floats  # (s,), below which a switch function counts as negative; -inf: not monitored
-    kind: Ints  # (s,), row of `least` to which its minima belong, or NONE
     enter_re: Floats  # (2 n, m), coordinates of a unit motion
     enter_im: Floats
     offset: Floats  # (2, 3, m), further terms: times cosine and sine of the shaft's angle, and constant
@@ -52,8 +50,8 @@ class PieceTables(Struct):
 class PieceRoom(Struct):
     """Work space of a piece."""
 
-    switch: Floats  # (4, s), switch functions and their rates before and after a step
-    roots: Floats  # (s,)
+    switch: Floats  # (4, q), switch functions and their rates before and after a step
+    roots: Floats  # (q,)
     ahead: Floats  # (2, m)
     coordinates: Floats  # (2, 2, m), at the beginning of the piece, and at its end
 
@@ -71,11 +69,11 @@ class Timing(Struct):
     most_events: int  # in a revolution
 
 
-def piece_room(n_switch: int, width: int) -> PieceRoom:
-    """Work space for pieces with so many switch functions and coordinates."""
+def piece_room(q: int, width: int) -> PieceRoom:
+    """Work space for pieces of q pairs with so many coordinates."""
     return PieceRoom(
-        switch=np.zeros((4, n_switch)),
-        roots=np.zeros(n_switch),
+        switch=np.zeros((4, q)),
+        roots=np.zeros(q),
         ahead=np.zeros((2, width)),
         coordinates=np.empty((2, 2, width)),
     )
@@ -107,17 +105,17 @@ def follow_piece(
     motions : (4, 2 n)
         Filled in: motion at the end before the event, its rate at the beginning and at the end, and the
         gradient of the first switch function that vanishes, by the motion (unchanged where none vanishes).
-    rates : (s,)
+    rates : (q,)
         Filled in: rates of the switch functions at the end.
     least : (2, q)
-        Smallest minimum of the switch functions of each kind and pair; lowered in place.
+        Smallest minimum of the gap, then of the force of each pair; lowered in place.
 
     Returns
     -------
     float
         Time passed, s.
     int
-        Bits of the switch functions that vanish; 0 at the end; -1 at an event beyond the limit of
+        Pairs whose switch functions vanish; 0 at the end; -1 at an event beyond the limit of
         displacements.
     """
     entered, ended = room.coordinates[0], room.coordinates[1]
@@ -140,7 +138,7 @@ def follow_piece(
         z, change = room.coordinates[place], room.ahead
         for k in range(z.shape[1]):
             growth, turning = tables.exponent[0, k], tables.exponent[1, k]
-            change[0, k] = growth * z[0, k] - turning * z[1, k] + tables.drift[k]
+            change[0, k] = growth * z[0, k] - turning * z[1, k]
             change[1, k] = growth * z[1, k] + turning * z[0, k]
         for row in range(motion.size):
             motions[RATE_BEGUN + place, row] = dot(shape_re[row], shape_im[row], change[0], change[1])
@@ -174,23 +172,22 @@ def next_event(
     z_entered, z = room.coordinates[0], room.coordinates[1]
     switch_re, switch_im = tables.switch_re, tables.switch_im
     rate_re, rate_im = tables.rate_re, tables.rate_im
-    bound, floor, exponent, drift = tables.bound, tables.floor, tables.exponent, tables.drift
+    bound, closed, exponent = tables.bound, tables.closed, tables.exponent
     power_re, power_im = tables.power_re, tables.power_im
-    n_switch, m = floor.size, z.shape[1]
+    q, m = bound.shape
     now, now_rate, then, then_rate = room.switch[0], room.switch[1], room.switch[2], room.switch[3]
     ahead = room.ahead
-    stride = n_switch // least.shape[1]
     for k in range(m):
         z[0, k], z[1, k] = z_entered[0, k], z_entered[1, k]
-    read_switches(switch_re, switch_im, rate_re, rate_im, floor, z, now, now_rate)
+    read_switches(switch_re, switch_im, rate_re, rate_im, z, now, now_rate)
     n_tick = int(duration / tick)
     passed, halving = 0, NONE
-    is_forced = below(now, floor) != 0
+    is_forced = below(now, closed) != 0
     while True:
         is_last = passed >= n_tick
         level = 0
         if is_last:
-            move(exponent, drift, duration, z_entered, ahead)
+            move(exponent, duration, z_entered, ahead)
             step = duration - passed * tick
         else:
             level = min(longest_level, floor_log2(n_tick - passed))
@@ -200,20 +197,17 @@ def next_event(
                 level = min(level, halving)
             else:
                 free = np.inf
-                for j in range(n_switch):
-                    if floor[j] > -np.inf:
-                        b = bounded(bound[j], z[0], z[1])
-                        free = min(free, positive_interval(now[j], now_rate[j], b))
+                for j in range(q):
+                    b = bounded(bound[j], z[0], z[1])
+                    free = min(free, positive_interval(now[j], now_rate[j], b))
                 while level > search_level and (1 << level) * tick > free:
                     level -= 1
             step = (1 << level) * tick
             propagate(power_re[level], power_im[level], z[0], z[1], ahead[0], ahead[1])
-            for k in range(m):
-                ahead[0, k] += drift[k] * step
-        read_switches(switch_re, switch_im, rate_re, rate_im, floor, ahead, then, then_rate)
+        read_switches(switch_re, switch_im, rate_re, rate_im, ahead, then, then_rate)
         crossing = int(np.int64(0))  # no literal: callers are compiled for one type
         if not is_forced:
-            crossing = below(then, floor)
+            crossing = below(then, closed)
         if (
             crossing != 0
             and level > 0
@@ -225,11 +219,11 @@ def next_event(
         if crossing != 0:
             first, last = passed * tick, min(duration, (passed + 1) * tick)
             return refine(tables, room.roots, crossing, first, last, tick, z_entered, z)
-        for j in range(n_switch):
-            if floor[j] > -np.inf and now_rate[j] < 0.0 and then_rate[j] > 0.0:
-                value = turning_value(now[j], now_rate[j], then[j], then_rate[j], step)
-                if tables.kind[j] >= 0 and value > -floor[j]:  # a gap that just opened is zero up to rounding
-                    least[tables.kind[j], j // stride] = min(least[tables.kind[j], j // stride], value)
+        for j in range(q):
+            if now_rate[j] < 0.0 and then_rate[j] > 0.0:
+                value, kind = turning_value(now[j], now_rate[j], then[j], then_rate[j], step), closed >> j & 1
+                if value > -floor_of(closed, j):  # a gap that just opened is zero up to rounding
+                    least[kind, j] = min(least[kind, j], value)
             now[j], now_rate[j] = then[j], then_rate[j]
         for k in range(m):
             z[0, k], z[1, k] = ahead[0, k], ahead[1, k]
@@ -246,36 +240,40 @@ def read_switches(
     switch_im: Floats,
     rate_re: Floats,
     rate_im: Floats,
-    floor: Floats,
     z: Floats,
     value: Floats,
     rate: Floats,
 ) -> None:
-    """Monitored switch functions (n_switch,) and their rates."""
+    """Switch functions (q,) and their rates."""
     for j in range(value.size):
-        if floor[j] > -np.inf:
-            value[j] = dot(switch_re[j], switch_im[j], z[0], z[1])
-            rate[j] = dot(rate_re[j], rate_im[j], z[0], z[1])
+        value[j] = dot(switch_re[j], switch_im[j], z[0], z[1])
+        rate[j] = dot(rate_re[j], rate_im[j], z[0], z[1])
 
 
 @linked_sum
-def below(value: Floats, floor: Floats) -> int:
-    """Bits of the switch functions below their floors."""
+def floor_of(closed: int, j: int) -> float:
+    """Value below which the switch function of a pair counts as negative."""
+    return 0.0 if closed >> j & 1 else -GAP_TOLERANCE
+
+
+@linked_sum
+def below(value: Floats, closed: int) -> int:
+    """Pairs whose switch functions are below their floors."""
     crossing = int(np.int64(0))  # no literal: callers are compiled for one type
     for j in range(value.size):
-        if value[j] < floor[j]:
+        if value[j] < floor_of(closed, j):
             crossing |= 1 << j
     return crossing
 
 
 @linked_sum
-def move(exponent: Floats, drift: Floats, time: float, z_entered: Floats, z: Floats) -> None:
+def move(exponent: Floats, time: float, z_entered: Floats, z: Floats) -> None:
     """Coordinates (2, m) a time (s) after `z_entered`."""
     for k in range(z.shape[1]):
         size = np.exp(exponent[0, k] * time)
         turn = exponent[1, k] * time
         re, im = size * np.cos(turn), size * np.sin(turn)
-        z[0, k] = re * z_entered[0, k] - im * z_entered[1, k] + drift[k] * time
+        z[0, k] = re * z_entered[0, k] - im * z_entered[1, k]
         z[1, k] = re * z_entered[1, k] + im * z_entered[0, k]
 
 
@@ -294,7 +292,7 @@ def refine(
 
     A function that falls slowly may pass zero some ticks before it falls below its floor.
     """
-    exponent, drift = tables.exponent, tables.drift
+    exponent = tables.exponent
     switch_re, switch_im = tables.switch_re, tables.switch_im
     rate_re, rate_im = tables.rate_re, tables.rate_im
     earliest = max(0.0, first - (1 << FORCED_LEVEL) * tick)
@@ -305,7 +303,7 @@ def refine(
             continue
         time, change = first, np.inf
         for _ in range(MOST_REFINEMENTS):
-            move(exponent, drift, time, z_entered, z)
+            move(exponent, time, z_entered, z)
             value = dot(switch_re[j], switch_im[j], z[0], z[1])
             rate = dot(rate_re[j], rate_im[j], z[0], z[1])
             if not rate < 0.0:
@@ -321,5 +319,5 @@ def refine(
     for j in range(roots.size):
         if roots[j] <= found + SAME_TIME:
             together |= 1 << j
-    move(exponent, drift, found, z_entered, z)
+    move(exponent, found, z_entered, z)
     return found, together

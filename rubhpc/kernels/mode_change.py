@@ -32,7 +32,7 @@ class EventWork(Struct):
     """Work space of an event, q pairs."""
 
     force: Floats  # (q,)
-    given: Floats  # (2, q), normal impulses of the event, N s, and tractions, which none has
+    given: Floats  # (q,), normal impulses of the event, N s
     speed: Floats  # (q,)
     impulse: Floats  # (q,), accumulated before the event, N s
     active: NDArray[np.bool_]  # (q,)
@@ -44,7 +44,7 @@ def event_work(q: int) -> EventWork:
     """Work space of the events of q pairs, without a trail."""
     return EventWork(
         force=np.zeros(q),
-        given=np.zeros((2, q)),
+        given=np.zeros(q),
         speed=np.zeros(q),
         impulse=np.zeros(q),
         active=np.zeros(q, dtype=np.bool_),
@@ -105,7 +105,7 @@ def change_contacts(
     longer than `moment` (s), the accelerations decide. Fills the impulses `work.given`.
     """
     q, n = reduced.gap_jacobian.shape
-    force, given, speed, active = work.force, work.given[0], work.speed, work.active
+    force, given, speed, active = work.force, work.given, work.speed, work.active
     hidden = hidden_flight(reduced)
     candidates = (closed & ~crossing) | (crossing & ~closed)
     velocity = motion[n:]

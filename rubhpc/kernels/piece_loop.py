@@ -19,7 +19,6 @@ from rubhpc.kernels.case_progress import (
 )
 from rubhpc.kernels.contact_modes import ModeTables, Reduced, dot
 from rubhpc.kernels.event_loop import advance
-from rubhpc.kernels.penalty_events import pressed_pairs
 from rubhpc.kernels.pieces import (
     PART,
     PART_TO_BEGIN,
@@ -88,7 +87,7 @@ def advance_pieces(
         now = clock_of(clock, pieces, piece)
         if at[STAGE] == TO_BEGIN:
             start_piece(reduced, pieces, piece, recorder, samples)
-            progress.wanted = first_set(reduced, pieces.motion[piece], pieces.pressing[piece])
+            progress.wanted = first_set(pieces.pressing[piece])
             at[STAGE] = TO_ENTER
         if at[STAGE] == TO_ENTER:
             if not begin_piece(tables, reduced, pieces, clock.sample_level, progress, z):
@@ -122,10 +121,8 @@ def advance_pieces(
 
 
 @linked_sum
-def first_set(reduced: Reduced, motion: Floats, pressing: Floats) -> int:
-    """Set of closed pairs with which a piece begins, in a motion (2 n,) with contact forces (q,), N."""
-    if reduced.spring > 0.0:
-        return pressed_pairs(reduced, motion)
+def first_set(pressing: Floats) -> int:
+    """Set of closed pairs with which a piece begins, under contact forces (q,), N."""
     found = int(np.int64(0))  # no literal: callers are compiled for one type
     for i in range(pressing.size):
         if pressing[i] > 0.0:

@@ -43,37 +43,13 @@ class Pieces(Struct):
     n_part_sample: int  # of each of its parts, which have their own sums
     energy_limit: float  # J
     at: Ints  # (4,), piece, part of it, stage, set of contacts before it
-    moved_by: int  # bits of a set that determine the motion; 0 where modes do not follow the speed
+    follows: bool  # whether modes follow the speed
     left: Floats  # (2, m), coordinates at the end of the previous piece
     motion: Floats  # (k + 1, 2 n), at the beginning of each piece; given for the first one
     pressing: Floats  # (k + 1, q), N, contact forces there
     seen: Floats  # (2, 3 + places), `Recorder.last` at the beginning of the current piece
     n_step: Ints  # (k,), steps taken
     whole: Floats  # (o, k n_sample), samples
-
-
-_NUMBERS, _COUNTS, _ROWS = np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros((0, 0))
-NO_PIECES = Pieces(
-    spin=_NUMBERS,
-    growth=_NUMBERS,
-    tick=_NUMBERS,
-    search_level=_COUNTS,
-    force=np.zeros((0, 2, 0)),
-    since=_NUMBERS,
-    table=_COUNTS,
-    n_room=0,
-    n_sample=0,
-    n_part_sample=0,
-    energy_limit=0.0,
-    at=_COUNTS,
-    moved_by=0,
-    left=_ROWS,
-    motion=_ROWS,
-    pressing=_ROWS,
-    seen=_ROWS,
-    n_step=_COUNTS,
-    whole=_ROWS,
-)
 
 
 @inlined
@@ -148,7 +124,7 @@ def begin_piece(
     mode = find_mode(tables.mask, progress.wanted)
     if mode < 0:
         return False
-    goes_on = pieces.moved_by != 0 and (pieces.at[STANDING] ^ progress.wanted) & pieces.moved_by == 0
+    goes_on = pieces.follows and pieces.at[STANDING] == progress.wanted
     enter(tables, mode, reduced.clearance, 1.0, 0.0, pieces.motion[piece], z)
     if goes_on:
         for k in range(tables.n_eigenmode[mode]):

@@ -35,26 +35,18 @@ def retune_powers(tables: ModeTables, mode: int, exponent: Complexes, end: int, 
 
 
 @linked
-def retune_bounds(
-    tables: ModeTables, mode: int, exponent: Complexes, end: int, tick: float, interval: float
-) -> None:
+def retune_bounds(tables: ModeTables, mode: int, exponent: Complexes, end: int, tick: float) -> None:
     """What bounds and paces have of the exponentials of the first `end` coordinates."""
     longest = tick * 2.0 ** (tables.power_re.shape[1] - 1)
-    weight, edge = np.empty((2, end))
+    weight = np.empty(end)
     for k in range(end):
         size, real = abs(exponent[k]), exponent[k].real
         weight[k] = size * size * (np.exp(real * longest) if real > 0.0 else 1.0)
-        is_fast = exponent[k].imag == 0.0 and real * interval < -1.0
-        edge[k] = -size if is_fast else size
         tables.pace[mode, k] = DYING if real * tick * 2.0**FORCED_LEVEL < GONE else size
     for i in range(tables.bound.shape[1]):
         re, im, bound = tables.switch_re[mode, i], tables.switch_im[mode, i], tables.bound[mode, i]
         for k in range(end):
             bound[k] = np.sqrt(re[k] * re[k] + im[k] * im[k]) * weight[k]
-        if i < tables.turn.shape[1]:
-            turn = tables.turn[mode, i]
-            for k in range(end):
-                turn[k] = bound[k] * edge[k]
 
 
 @linked

@@ -11,16 +11,14 @@ from rubhpc.kernels.accumulators import Accumulator  # noqa: TC001 - part of a k
 from rubhpc.kernels.contact_modes import Reduced, find_mode
 from rubhpc.kernels.flow import BEFORE, PieceRoom, PieceTables, Timing, follow_piece
 from rubhpc.kernels.mode_change import EventWork, change_contacts
-from rubhpc.kernels.penalty_events import change_pressed
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-# Outcomes: all revolutions are followed; a contact mode is missing; the rows are full; an event is left to
-# the caller; a displacement passes its limit; no contact forces satisfy the laws; too many events in a
-# revolution.
-FOLLOWED, MODE_UNKNOWN, FULL, AT_EVENT, BEYOND, UNSOLVED, TOO_MANY = range(7)
+# Outcomes: all revolutions are followed; a contact mode is missing; the rows are full; a displacement passes
+# its limit; no contact forces satisfy the laws; too many events in a revolution.
+FOLLOWED, MODE_UNKNOWN, FULL, BEYOND, UNSOLVED, TOO_MANY = range(6)
 PIECE, STATES, REVOLUTION, BEGUN = range(4)  # items of `reached`
 AFTER = 4  # row of the motions of a piece, after those of `flow.follow_piece`
 
@@ -30,19 +28,15 @@ class PieceModes(Struct):
 
     mask: Ints  # (p,)
     is_known: Flags  # (p,), whether the mode's row is filled in
-    gaps: Ints  # (p,), bits of the switch functions that are gaps
     n_moving: Ints  # (p,), first coordinates that move with the motion; the others do not
-    switch_re: Floats  # (p, s, m)
+    switch_re: Floats  # (p, q, m)
     switch_im: Floats
-    rate_re: Floats  # (p, s, m)
+    rate_re: Floats  # (p, q, m)
     rate_im: Floats
-    bound: Floats  # (p, s, m)
+    bound: Floats  # (p, q, m)
     power_re: Floats  # (p, levels, m)
     power_im: Floats
     exponent: Floats  # (p, 2, m)
-    drift: Floats  # (p, m)
-    floor: Floats  # (p, s)
-    kind: Ints  # (p, s)
     enter_re: Floats  # (p, 2 n, m)
     enter_im: Floats
     offset: Floats  # (p, 2, 3, m)
@@ -53,17 +47,17 @@ class PieceModes(Struct):
 class PieceRows(Struct):
     """Pieces of a motion, one per row."""
 
-    states: Ints  # (k, 4), states in the piece, `crossing`, the gaps among these, states after the event
+    states: Ints  # (k, 4), pairs closed in the piece, `crossing`, gaps among these, pairs closed afterwards
     times: Floats  # (k, 2), s, beginning after the shaft's angle 0, and duration
     motions: Floats  # (k, 5, 2 n), those of `flow.follow_piece`, then the motion after the event
-    rates: Floats  # (k, s), of the switch functions at the end
-    given: Floats  # (k, 2, q), normal and tangential impulses of the event, N s
+    rates: Floats  # (k, q), of the switch functions at the end
+    given: Floats  # (k, q), normal impulses of the event, N s
 
 
 class Passage(Struct):
     """How far a motion has been followed; all changes in place."""
 
-    reached: Ints  # (4,), pieces filled in, states of the pairs, revolution, and pieces before that
+    reached: Ints  # (4,), pieces filled in, closed pairs, revolution, and pieces before that
     passed: Floats  # (1,), s, time reached in the revolution
     motion: Floats  # (2 n,)
 
@@ -74,19 +68,19 @@ def new_passage(width: int) -> Passage:
 
 
 def begin_passage(passage: Passage, motion: Floats, states: int, begin: float) -> None:
-    """Begin with a motion (2 n,) and the pairs in these states, a time (s) after the shaft's angle 0."""
+    """Begin with a motion (2 n,) and these pairs closed, a time (s) after the shaft's angle 0."""
     passage.reached[:] = 0, states, 0, 0
     passage.passed[0], passage.motion[:] = begin, motion
 
 
-def piece_rows(k: int, width: int, n_switch: int, q: int) -> PieceRows:
+def piece_rows(k: int, width: int, q: int) -> PieceRows:
     """Arrays for k pieces of motions of this width (2 n) with q pairs."""
     return PieceRows(
         states=np.empty((k, 4), dtype=np.int64),
         times=np.empty((k, 2)),
         motions=np.empty((k, 5, width)),
-        rates=np.empty((k, n_switch)),
-        given=np.empty((k, 2, q)),
+        rates=np.empty((k, q)),
+        given=np.empty((k, q)),
     )
 
 
@@ -96,7 +90,6 @@ def follow_revolutions(
     reduced: Reduced,
     room: PieceRoom,
     timing: Timing,
-    takes_events: bool,
     passage: Passage,
     rows: PieceRows,
     least: Floats,
@@ -107,8 +100,6 @@ def follow_revolutions(
 
     Parameters
     ----------
-    takes_events : bool
-        Whether events are computed here; else each is left to the caller, who changes motion and states.
     least : (r, 2, q)
         As in `flow.follow_piece`, for each of the r revolutions.
     work : EventWork, accumulator : Accumulator
@@ -125,6 +116,7 @@ def follow_revolutions(
         if place < 0 or not modes.is_known[place]:
             return MODE_UNKNOWN
         tables = PieceTables(
+            modes.mask[place],
             modes.switch_re[place],
             modes.switch_im[place],
             modes.rate_re[place],
@@ -133,9 +125,6 @@ def follow_revolutions(
             modes.power_re[place],
             modes.power_im[place],
             modes.exponent[place],
-            modes.drift[place],
-            modes.floor[place],
-            modes.kind[place],
             modes.enter_re[place],
             modes.enter_im[place],
             modes.offset[place],
@@ -158,36 +147,33 @@ def follow_revolutions(
         if crossing < 0:
             return BEYOND
         after, given = rows.motions[k, AFTER], rows.given[k]
-        for i in range(given.shape[1]):
-            given[0, i], given[1, i] = 0.0, 0.0
+        for i in range(given.size):
+            given[i] = 0.0
         for i in range(motion.size):
             after[i] = rows.motions[k, BEFORE, i]
         passed[0] = begun + duration
         states_after = states
-        if crossing != 0 and takes_events:
-            if reduced.spring > 0.0:
-                states_after = change_pressed(reduced, states, crossing, after)
-            else:
-                angle = timing.spin * passed[0]
-                states_after = change_contacts(
-                    reduced,
-                    states,
-                    crossing,
-                    timing.spin,
-                    timing.moment,
-                    np.cos(angle),
-                    np.sin(angle),
-                    after,
-                    bool(np.bool_(False)),  # no literal, for which it would be compiled again
-                    work,
-                    accumulator,
-                )
-                for i in range(given.shape[1]):
-                    given[0, i] = work.given[0, i]
+        if crossing != 0:
+            angle = timing.spin * passed[0]
+            states_after = change_contacts(
+                reduced,
+                states,
+                crossing,
+                timing.spin,
+                timing.moment,
+                np.cos(angle),
+                np.sin(angle),
+                after,
+                bool(np.bool_(False)),  # no literal, for which it would be compiled again
+                work,
+                accumulator,
+            )
+            for i in range(given.size):
+                given[i] = work.given[i]
             if states_after < 0:
                 return UNSOLVED
         rows.states[k, 0], rows.states[k, 1] = states, crossing
-        rows.states[k, 2], rows.states[k, 3] = crossing & modes.gaps[place], states_after
+        rows.states[k, 2], rows.states[k, 3] = crossing & ~states, states_after
         rows.times[k, 0], rows.times[k, 1] = begun, duration
         for i in range(motion.size):
             motion[i] = after[i]
@@ -196,6 +182,4 @@ def follow_revolutions(
             reached[REVOLUTION] += 1
             reached[BEGUN] = k + 1
             passed[0] = timing.begin
-        elif not takes_events:
-            return AT_EVENT
     return FOLLOWED

@@ -37,10 +37,6 @@ class Recorder(Struct):
     node: Floats  # (4, q), force, slip speed (N, m/s) and their rates of closed pairs at the last step
     begun: Floats  # (2, m), coordinates where the span under way began, in one contact mode throughout
     gained: Floats  # (2,), J, damping loss and unbalance work since then, but for their steady parts
-    # Under set-valued friction:
-    given: Floats  # (q,), normal impulses of the event that ends the span, N s
-    pair: Floats  # (q, 6), force of each pair within the span (`span_forces`)
-    path: Floats  # (4, 2, m), coordinates within it
 
 
 def recorder(q: int, n_probe: int = 0) -> Recorder:
@@ -52,15 +48,12 @@ def recorder(q: int, n_probe: int = 0) -> Recorder:
         node=np.zeros((4, q)),
         begun=np.zeros((2, 0)),
         gained=np.zeros(2),
-        given=np.zeros(q),
-        pair=np.zeros((q, 6)),
-        path=np.zeros((4, 2, 0)),
     )
 
 
 def with_coordinates(recorder: Recorder, m: int) -> Recorder:
     """The same with work space for m coordinates."""
-    return recorder._replace(begun=np.zeros((2, m)), path=np.zeros((4, 2, m)))
+    return recorder._replace(begun=np.zeros((2, m)))
 
 
 class Measured(Struct):

@@ -14,7 +14,6 @@ from rubhpc.kernels.flow import PieceRoom, Timing  # noqa: TC001 - part of a ker
 from rubhpc.kernels.mode_change import EventWork, product
 from rubhpc.kernels.revolutions import (
     AFTER,
-    AT_EVENT,
     BEGUN,
     FOLLOWED,
     FULL,
@@ -93,7 +92,6 @@ def search_period(
     reduced: Reduced,
     room: PieceRoom,
     timing: Timing,
-    has_states: bool,
     search: Search,
     changes: ChangeRoom,
     passage: Passage,
@@ -111,8 +109,6 @@ def search_period(
 
     Parameters
     ----------
-    has_states : bool
-        Whether friction is set-valued: events are left to the caller, as by `follow_revolutions`.
     search : Search
         In place.
     passage, least
@@ -137,14 +133,13 @@ def search_period(
                     reduced,
                     room,
                     timing,
-                    not has_states,
                     passage,
                     second_rows if now[BEST] == 0 else first_rows,
                     least,
                     work,
                     accumulator,
                 )
-                if outcome in (MODE_UNKNOWN, FULL, AT_EVENT):
+                if outcome in (MODE_UNKNOWN, FULL):
                     return outcome
             is_first = now[N_PIECE] == 0
             if is_first and outcome != FOLLOWED:
@@ -185,7 +180,6 @@ def search_period(
             piece = carry_pieces(
                 modes,
                 reduced,
-                has_states,
                 first_rows if now[BEST] == 0 else second_rows,
                 int(now[CARRIED]),
                 int(now[N_SHORTEST] if is_end else now[N_PIECE]),

@@ -19,7 +19,6 @@ Ints = NDArray[np.int64]
 
 ALL_CARRIED = -1
 NO_IMPULSE = 1e-12  # of the largest impulse of an event
-STOPPED = 1e-9  # of the rim's speed: what slips less after an impact sticks
 
 
 class ChangeRoom(Struct):
@@ -30,10 +29,9 @@ class ChangeRoom(Struct):
     weight: Floats  # (2, 2 n), what a motion adds to a coordinate
     row: Floats  # (k,), what they do to a switch function, over its rate
     jump: Floats  # (2 n,), rate of the motion after an event less what the impact makes of that before
-    direction: Floats  # (2 q, n), of the impulses of an impact
-    rows: Floats  # (2 q, 2 q + n), these impulses by the velocities before, behind a matrix
-    scale: Floats  # (2 q,)
-    impulse: Floats  # (2 q, k)
+    pair: Ints  # (q,), those with an impulse in an impact
+    rows: Floats  # (q, q + n), these impulses by the velocities before, behind a matrix
+    impulse: Floats  # (q, k)
 
 
 def change_room(m: int, n: int, q: int, k: int) -> ChangeRoom:
@@ -44,10 +42,9 @@ def change_room(m: int, n: int, q: int, k: int) -> ChangeRoom:
         weight=np.empty((2, 2 * n)),
         row=np.empty(k),
         jump=np.empty(2 * n),
-        direction=np.empty((2 * q, n)),
-        rows=np.empty((2 * q, 2 * q + n)),
-        scale=np.empty(2 * q),
-        impulse=np.empty((2 * q, k)),
+        pair=np.empty(q, dtype=np.int64),
+        rows=np.empty((q, q + n)),
+        impulse=np.empty((q, k)),
     )
 
 
@@ -55,7 +52,6 @@ def change_room(m: int, n: int, q: int, k: int) -> ChangeRoom:
 def carry_pieces(
     modes: PieceModes,
     reduced: Reduced,
-    has_states: bool,
     rows: PieceRows,
     first: int,
     last: int,
@@ -72,8 +68,6 @@ def carry_pieces(
 
     Parameters
     ----------
-    has_states : bool
-        Whether friction is set-valued.
     columns : (2 n, k)
         Changes of the motion with which piece `first` begins; in place.
     kept : (p, 2 n, k)
@@ -99,10 +93,9 @@ def carry_pieces(
             room,
             columns,
         )
-        if rows.states[k, 1] != 0 and (has_states or rows.states[k, 2] != 0):
+        if rows.states[k, 2] != 0:  # nothing jumps where a pair opens
             saltate(
                 reduced,
-                has_states,
                 rows.states[k],
                 rows.motions[k],
                 rows.rates[k],
@@ -178,7 +171,6 @@ def add_rows_twice(rows: Floats, a: Floats, b: Floats, first: Floats, second: Fl
 @linked_sum
 def saltate(
     reduced: Reduced,
-    has_states: bool,
     states: Ints,
     motions: Floats,
     rates: Floats,
@@ -203,11 +195,9 @@ def saltate(
     add_rows(columns, motions[GRADIENT], row)
     for i in range(jump.size):
         jump[i] = motions[RATE_ENDED, i]
-    n_impulse = 0
-    if states[2] != 0:
-        n_impulse = impulses_of(reduced, has_states, given, motions[AFTER, n:], room)
+    n_impulse = impulses_of(reduced, given, motions[AFTER, n:], room)
     for i in range(n_impulse):
-        gain, direction, impulse = gain_of(room, i), room.direction[i], room.impulse[i]
+        gain, direction, impulse = gain_of(room, i), reduced.force_direction[room.pair[i]], room.impulse[i]
         strength = product(gain, motions[RATE_ENDED, n:])
         for k in range(n):
             jump[n + k] -= direction[k] * strength
@@ -215,7 +205,7 @@ def saltate(
             impulse[j] = 0.0
         add_rows(columns[n:], gain, impulse)
     for i in range(n_impulse):
-        direction, impulse = room.direction[i], room.impulse[i]
+        direction, impulse = reduced.force_direction[room.pair[i]], room.impulse[i]
         for k in range(n):
             along, target = direction[k], columns[n + k]
             for j in range(row.size):
@@ -233,49 +223,31 @@ def gain_of(room: ChangeRoom, i: int) -> Floats:
 
 
 @linked_sum
-def impulses_of(reduced: Reduced, has_states: bool, given: Floats, velocity: Floats, room: ChangeRoom) -> int:
+def impulses_of(reduced: Reduced, given: Floats, velocity: Floats, room: ChangeRoom) -> int:
     """Fill in what an impact makes of velocities: `dv+ = dv- - F (R F)^-1 R dv-`; returns the rows of R.
 
     The rows R are those of the gap velocities that impulses change, each times 1 + restitution where the pair
-    parts, and of the slips that they stop; F (`room.direction`) are the directions of these impulses,
-    friction in proportion included, and `gain_of` has the rows of `(R F)^-1 R`. `given` are its impulses and
-    tractions (2, q), `velocity` (n,) what it leaves.
+    parts; F are the directions of the impulses of these pairs (`room.pair`), friction included, and `gain_of`
+    has the rows of `(R F)^-1 R`. `given` (q,) are the impulses, `velocity` (n,) is what they leave.
     """
     q, n = reduced.gap_jacobian.shape
     largest = 0.0
     for i in range(q):
-        largest = max(largest, abs(given[0, i]))
+        largest = max(largest, abs(given[i]))
     if largest == 0.0:
         return 0
-    n_row, direction, rows = 0, room.direction, room.rows
+    n_row, pair, rows = 0, room.pair, room.rows
     for i in range(q):
-        if not given[0, i] > NO_IMPULSE * largest:
-            continue
-        parts = abs(product(reduced.gap_jacobian[i], velocity)) > AT_REST
-        room.scale[n_row] = 1.0 + reduced.restitution if parts else 1.0
-        share, stops = 0.0, False
-        if has_states:
-            slip = reduced.rim_speed[i] + product(reduced.slip[i], velocity)
-            stops = abs(slip) <= STOPPED * reduced.rim_speed[i]
-            share = 0.0 if stops else given[1, i] / given[0, i]
-        for k in range(n):
-            rows[n_row, 2 * q + k] = reduced.gap_jacobian[i, k]
-            if has_states:
-                direction[n_row, k] = reduced.gap_jacobian[i, k] - share * reduced.slip[i, k]
-            else:
-                direction[n_row, k] = reduced.force_direction[i, k]
-        n_row += 1
-        if stops:
-            room.scale[n_row] = 1.0
-            for k in range(n):
-                rows[n_row, 2 * q + k] = direction[n_row, k] = -reduced.slip[i, k]
+        if given[i] > NO_IMPULSE * largest:
+            pair[n_row] = i
             n_row += 1
-    for i in range(n_row):
-        for j in range(n_row):
-            rows[i, j] = product(rows[i, 2 * q :], direction[j])
-        for j in range(n_row, 2 * q):
-            rows[i, j] = 0.0
+    for a in range(n_row):
+        gap = reduced.gap_jacobian[pair[a]]
+        parts = abs(product(gap, velocity)) > AT_REST
+        scale = 1.0 + reduced.restitution if parts else 1.0
+        for b in range(q):
+            rows[a, b] = reduced.delassus[pair[a], pair[b]] if b < n_row else 0.0
         for k in range(n):
-            rows[i, 2 * q + k] *= room.scale[i]
+            rows[a, q + k] = scale * gap[k]
     eliminate(rows, n_row)
     return n_row

@@ -26,7 +26,6 @@ Ints = NDArray[np.int64]
 
 ALL_CARRIED = -1
 NO_IMPULSE = 1e-12  # of the largest impulse of an event
-STOPPED = 1e-9  # of the rim's speed: a pair that slips less after an impact sticks
 LOST = 1e-280  # a smaller displacement counts as zero
 PIECE, REVOLUTION, PASSED, IS_ENTERED = range(4)  # items of `Tangent.reached`
 
@@ -37,10 +36,7 @@ class TrailModes(Struct):
     of_piece: Ints  # (room + 1,), contact mode of each piece
     place: Ints  # (k,), in the tables, or -1
     exponent: Floats  # (k, 2, m), 1/s
-    drift: Floats  # (k, m), of the coordinates with exponent 0
-    opened: Ints  # (k,), bits of the switch functions that are gaps
-    has_states: bool  # whether pairs may slide in either sense and stick
-    slips_evenly: bool  # whether a pair that sticks begins to slide with the friction that it has
+    opened: Ints  # (k,), pairs that are open
 
 
 class Tangent(Struct):
@@ -52,14 +48,10 @@ class Tangent(Struct):
     d: Floats  # (2, m)
     z: Floats  # (2, m), the motion itself
     grown: Floats  # (n_revolution,), filled in: logarithm of the growth in each revolution
-    share: Floats  # (q,)
-    compliance: Floats  # (2 q, 2 q)
-    speed: Floats  # (2 q,)
-    found: Floats  # (2 q,)
-    rate: Floats  # (2, q), changes of gap rates, then of slips, by the displacement
-    given: Floats  # (2, q), derivatives of the normal, then the tangential impulses
-    active: NDArray[np.bool_]  # (2 q,)
-    elimination: Floats  # (2 q, 2 q + 1)
+    speed: Floats  # (q,)
+    given: Floats  # (q,), derivatives of the impulses
+    active: NDArray[np.bool_]  # (q,)
+    elimination: Floats  # (q, q + 1)
 
 
 def new_tangent(m: int, q: int, generic: Floats, n_revolution: int) -> Tangent:
@@ -71,14 +63,10 @@ def new_tangent(m: int, q: int, generic: Floats, n_revolution: int) -> Tangent:
         d=np.zeros((2, m)),
         z=np.zeros((2, m)),
         grown=np.zeros(n_revolution),
-        share=np.zeros(q),
-        compliance=np.zeros((2 * q, 2 * q)),
-        speed=np.zeros(2 * q),
-        found=np.zeros(2 * q),
-        rate=np.zeros((2, q)),
-        given=np.zeros((2, q)),
-        active=np.zeros(2 * q, dtype=np.bool_),
-        elimination=np.zeros((2 * q, 2 * q + 1)),
+        speed=np.zeros(q),
+        given=np.zeros(q),
+        active=np.zeros(q, dtype=np.bool_),
+        elimination=np.zeros((q, q + 1)),
     )
 
 
@@ -87,7 +75,6 @@ def carry_along(
     tables: ModeTables,
     reduced: Reduced,
     spin: float,
-    tick: float,
     first: int,
     per_revolution: int,
     trail: Trail,
@@ -114,7 +101,7 @@ def carry_along(
         place = modes.place[which]
         if place < 0:
             return int(k)
-        exponent, drift = modes.exponent[which], modes.drift[which]
+        exponent = modes.exponent[which]
         if reached[IS_ENTERED] == 0:
             enter_displacement(tables, place, 0.0, 0.0, tangent)
             reached[IS_ENTERED] = 1
@@ -148,26 +135,22 @@ def carry_along(
         shift, cosine_rate, sine_rate = 0.0, 0.0, 0.0
         move(tables, place, end - reached[PASSED], d)
         reached[PASSED] = end
-        if is_touching or (
-            modes.has_states and (trail.states[k + 1] & ~trail.states[k] != 0 or not modes.slips_evenly)
-        ):
+        if is_touching:
             copy_coordinates(trail.begun[k], z)
             move(tables, place, end - begun, z)
-            for i in range(z.shape[1]):
-                z[0, i] += drift[i] * (end - begun) * tick
             j = floor_log2(crossing & -crossing)
             rate = dot(tables.rate_re[place, j], tables.rate_im[place, j], z[0], z[1])
             shift = -dot(tables.switch_re[place, j], tables.switch_im[place, j], d[0], d[1]) / rate
-            add_rate(shift, exponent, drift, z, d)
+            add_rate(shift, exponent, z, d)
             forced = tables.n_eigenmode[place]
             cosine_rate, sine_rate = d[0, forced], d[1, forced]
         leave(tables, place, d, tangent.motion)
-        if is_touching and reduced.spring == 0.0:
-            strike_motion(reduced, modes.has_states, trail.given[k], trail.rate[k], tangent)
+        if is_touching:
+            strike_motion(reduced, trail.given[k], trail.rate[k], tangent)
         enter_displacement(tables, next_place, cosine_rate, sine_rate, tangent)
         if shift != 0.0:
             copy_coordinates(trail.begun[k + 1], z)
-            add_rate(-shift, modes.exponent[following], modes.drift[following], z, d)
+            add_rate(-shift, modes.exponent[following], z, d)
         forced = tables.n_eigenmode[next_place]
         d[0, forced], d[1, forced] = 0.0, 0.0
         reached[PIECE] = k + 1
@@ -184,11 +167,11 @@ def move(tables: ModeTables, place: int, n_tick: int, z: Floats) -> None:
 
 
 @linked_sum
-def add_rate(time: float, exponent: Floats, drift: Floats, z: Floats, d: Floats) -> None:
+def add_rate(time: float, exponent: Floats, z: Floats, d: Floats) -> None:
     """Add the change of a motion z in a time, s, to a displacement d, both (2, m)."""
     for i in range(z.shape[1]):
         growth, turning = time * exponent[0, i], time * exponent[1, i]
-        d[0, i] += growth * z[0, i] - turning * z[1, i] + time * drift[i]
+        d[0, i] += growth * z[0, i] - turning * z[1, i]
         d[1, i] += growth * z[1, i] + turning * z[0, i]
 
 
@@ -215,80 +198,28 @@ def size_of(motion: Floats, spin: float) -> float:
 
 
 @linked_sum
-def strike_motion(
-    reduced: Reduced, has_states: bool, impulse: Floats, rate: Floats, tangent: Tangent
-) -> None:
-    """Apply the derivative of an impact, from `strike`, to `tangent.motion`."""
-    q, n = reduced.gap_jacobian.shape
-    moved = tangent.motion[n:]
-    for i in range(q):
-        tangent.rate[0, i] = product(reduced.gap_jacobian[i], moved)
-        tangent.rate[1, i] = product(reduced.slip[i], moved)
-    strike(reduced, has_states, impulse, rate, tangent)
-    for i in range(q):
-        given, along_slip = tangent.given[0, i], tangent.given[1, i]
-        for k in range(n):
-            if has_states:
-                moved[k] += given * reduced.gap_jacobian[i, k] - along_slip * reduced.slip[i, k]
-            else:
-                moved[k] += given * reduced.force_direction[i, k]
-
-
-@linked_sum
-def strike(reduced: Reduced, has_states: bool, impulse: Floats, rate: Floats, tangent: Tangent) -> None:
-    """Fill `tangent.given` with the impulses of the derivative of an impact: `dv+ = dv- - F (R F)^-1 R dv-`.
+def strike_motion(reduced: Reduced, impulse: Floats, rate: Floats, tangent: Tangent) -> None:
+    """Apply the derivative of an impact to `tangent.motion`: `dv+ = dv- - F (R F)^-1 R dv-`.
 
     The rows R are those of the gap velocities that impulses change, each times 1 + restitution where the pair
-    parts, and of the slips that they stop. F are the directions of these impulses, including proportional
-    friction. `impulse` (2, q) are the normal and tangential impulses, `rate` (2, q) are gap rates and slips
-    after the impact, and `tangent.rate` the change of gap rates and slips by the displacement.
+    parts; F are the directions of the impulses, including friction. `impulse` (q,) are those of the event,
+    `rate` (q,) gap rates after it.
     """
-    q, active, share, compliance = reduced.radius.size, tangent.active, tangent.share, tangent.compliance
-    gap, slip = reduced.gap_jacobian, reduced.slip
-    tangent.given[:] = 0.0
+    q, n = reduced.gap_jacobian.shape
+    moved, active, given = tangent.motion[n:], tangent.active, tangent.given
     largest = 0.0
     for i in range(q):
-        largest = max(largest, abs(impulse[0, i]))
+        largest = max(largest, abs(impulse[i]))
     if largest == 0.0:
         return
     for i in range(q):
-        active[q + i] = False
-        active[i] = impulse[0, i] > NO_IMPULSE * largest
-        share[i] = 0.0
-        if active[i]:
-            parts = abs(rate[0, i]) > AT_REST
-            scale = 1.0 + reduced.restitution if parts else 1.0
-            tangent.speed[i] = scale * tangent.rate[0, i]
-            if has_states:
-                if abs(rate[1, i]) <= STOPPED * reduced.rim_speed[i]:
-                    active[q + i] = True
-                    tangent.speed[q + i] = tangent.rate[1, i]
-                else:
-                    share[i] = impulse[1, i] / impulse[0, i]
-    for j in range(q):
-        if active[j]:
-            for i in range(q):
-                if active[i]:
-                    compliance[i, j] = along(reduced, has_states, gap[i], j, share[j])
-                    if active[q + i]:
-                        compliance[q + i, j] = along(reduced, has_states, slip[i], j, share[j])
-                    if active[q + j]:
-                        compliance[i, q + j] = product(gap[i], slip[j])
-                        if active[q + i]:
-                            compliance[q + i, q + j] = product(slip[i], slip[j])
-    if not solve_active(compliance, tangent.speed, active, tangent.found, tangent.elimination):
+        active[i] = impulse[i] > NO_IMPULSE * largest
+        parts = abs(rate[i]) > AT_REST
+        scale = 1.0 + reduced.restitution if parts else 1.0
+        tangent.speed[i] = scale * product(reduced.gap_jacobian[i], moved)
+    if not solve_active(reduced.delassus, tangent.speed, active, given, tangent.elimination):
         return
     for i in range(q):
         if active[i]:
-            tangent.given[0, i] = tangent.found[i]
-            tangent.given[1, i] = share[i] * tangent.found[i]
-        if active[q + i]:
-            tangent.given[1, i] -= tangent.found[q + i]
-
-
-@linked_sum
-def along(reduced: Reduced, has_states: bool, row: Floats, j: int, share: float) -> float:
-    """Product of a row (n,) with the direction of the impulse of pair j."""
-    if has_states:
-        return product(row, reduced.gap_jacobian[j]) - share * product(row, reduced.slip[j])
-    return product(row, reduced.force_direction[j])
+            for k in range(n):
+                moved[k] += given[i] * reduced.force_direction[i, k]

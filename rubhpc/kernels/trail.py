@@ -23,17 +23,17 @@ class Trail(Struct):
     """
 
     n_event: Ints  # (1,), number of events, or BROKEN
-    states: Ints  # (room + 1,), set of closed pairs, or of the states of all pairs
+    states: Ints  # (room + 1,), set of closed pairs
     tick: Ints  # (room,), of each event
-    crossing: Ints  # (room,), bits of the switch functions that vanish there
+    crossing: Ints  # (room,), pairs whose switch functions vanish there
     begun: Floats  # (room + 1, 2, m), modal coordinates with which each piece begins
-    rate: Floats  # (room, 2, q), rates of gaps, then slips, after each event, m/s, of pairs with impulses
-    given: Floats  # (room, 2, q), normal and tangential impulses of each event, N s
+    rate: Floats  # (room, q), rates of gaps after each event, m/s, of pairs with impulses
+    given: Floats  # (room, q), normal impulses of each event, N s
 
 
 def new_trail(m: int, q: int) -> Trail:
     """Room for a trail of a case with m modal coordinates and q pairs."""
-    room = max(1, min(MOST_EVENTS, MOST_BYTES // (8 * (2 * m + 4 * q))))
+    room = max(1, min(MOST_EVENTS, MOST_BYTES // (8 * (2 * m + 2 * q))))
     return _with_room(room, m, q)
 
 
@@ -49,13 +49,13 @@ def _with_room(room: int, m: int, q: int) -> Trail:
         tick=np.zeros(room, dtype=np.int64),
         crossing=np.zeros(room, dtype=np.int64),
         begun=np.empty((room + 1, 2, m)),
-        rate=np.empty((room, 2, q)),
-        given=np.empty((room, 2, q)),
+        rate=np.empty((room, q)),
+        given=np.empty((room, q)),
     )
 
 
 def begin_trail(trail: Trail, states: int, z: Floats) -> None:
-    """Begin at a motion, given by its states and modal coordinates (2, m)."""
+    """Begin at a motion, given by its closed pairs and modal coordinates (2, m)."""
     trail.n_event[0], trail.states[0], trail.begun[0] = 0, states, z
 
 
@@ -71,18 +71,17 @@ def note_event(trail: Trail, tick: int, crossing: int) -> None:
 
 
 @linked
-def note_after(trail: Trail, rate: Floats, slip: Floats, given: Floats) -> None:
-    """Store rates of gaps and slips (q,), m/s, after the event, and its impulses (2, q)."""
+def note_after(trail: Trail, rate: Floats, given: Floats) -> None:
+    """Store rates of gaps (q,), m/s, after the event, and its impulses (q,)."""
     k = trail.n_event[0]
     if trail.tick.size > 0 and k >= 0:
-        for i in range(given.shape[1]):
-            trail.rate[k, 0, i], trail.rate[k, 1, i] = rate[i], slip[i]
-            trail.given[k, 0, i], trail.given[k, 1, i] = given[0, i], given[1, i]
+        for i in range(given.size):
+            trail.rate[k, i], trail.given[k, i] = rate[i], given[i]
 
 
 @linked
 def note_piece(trail: Trail, states: int, z: Floats) -> None:
-    """Store the states and coordinates (2, m) after the event."""
+    """Store the closed pairs and coordinates (2, m) after the event."""
     k = trail.n_event[0]
     if trail.tick.size > 0 and k >= 0:
         trail.states[k + 1] = states

@@ -25,7 +25,7 @@ class Watching(Struct):
     reached: Ints  # (3,), pieces, times and parts filled in
     columns: Floats  # (2 n, 2 n), derivative of the motion with which the piece begins by that at the section
     begun: Floats  # (2 n,), motion with which the piece begins
-    parts: Ints  # (s k, 4)
+    parts: Ints  # (q k, 4)
     value: Floats  # (t,)
     change: Floats  # (t, 2 n), by the motion at the section
     none_kept: Floats  # (0, 2 n, 2 n)
@@ -33,15 +33,15 @@ class Watching(Struct):
     passing: Floats  # (4, m)
 
 
-def begin_watching(motion: Floats, n_time: Ints, n_switch: int, m: int) -> Watching:
+def begin_watching(motion: Floats, n_time: Ints, q: int, m: int) -> Watching:
     """Begin with the motion (2 n,) at the section."""
-    most, width = n_switch * int(n_time.sum()), motion.size
+    most, width = q * int(n_time.sum()), motion.size
     return Watching(
         n_time=n_time,
         reached=np.zeros(3, dtype=np.int64),
         columns=np.eye(width),
         begun=motion.copy(),
-        parts=np.empty((n_switch * n_time.size, 4), dtype=np.int64),
+        parts=np.empty((q * n_time.size, 4), dtype=np.int64),
         value=np.empty(most),
         change=np.empty((most, width)),
         none_kept=np.empty((0, width, width)),
@@ -54,7 +54,6 @@ def begin_watching(motion: Floats, n_time: Ints, n_switch: int, m: int) -> Watch
 def watch_pieces(
     modes: PieceModes,
     reduced: Reduced,
-    has_states: bool,
     spin: float,
     rows: PieceRows,
     watching: Watching,
@@ -85,16 +84,13 @@ def watch_pieces(
         step = rows.times[k, 1] / n_time[k]
         before = k - 1 if k > 0 else n_piece - 1
         begins = rows.states[before, 1] != 0 and rows.states[before, 0] != rows.states[k, 0]
-        for j in range(modes.floor.shape[1]):
-            if not modes.floor[place, j] > -np.inf:
-                continue
+        for j in range(modes.bound.shape[1]):
             first, part = reached[N_TIME], reached[N_PART]
             parts[part, FIRST], parts[part, LAST] = first, first + n_time[k]
             parts[part, BEGINS], parts[part, ENDS] = begins, (rows.states[k, 1] >> j) & 1
             watch_function(
                 n_moving,
                 modes.exponent[place],
-                modes.drift[place],
                 modes.switch_re[place, j],
                 modes.switch_im[place, j],
                 step,
@@ -105,7 +101,7 @@ def watch_pieces(
                 watching.change[first : first + n_time[k]],
             )
             reached[N_TIME], reached[N_PART] = first + n_time[k], part + 1
-        carry_pieces(modes, reduced, has_states, rows, int(k), int(k + 1), room, columns, watching.none_kept)
+        carry_pieces(modes, reduced, rows, int(k), int(k + 1), room, columns, watching.none_kept)
         for i in range(begun.size):
             begun[i] = rows.motions[k, AFTER, i]
         reached[PIECE] = k + 1
@@ -131,7 +127,6 @@ def enter_changes(
 def watch_function(
     n_moving: int,
     exponent: Floats,
-    drift: Floats,
     switch_re: Floats,
     switch_im: Floats,
     step: float,
@@ -152,11 +147,11 @@ def watch_function(
         passing[0, i], passing[1, i] = re, im
         passing[2, i], passing[3, i] = re * re - im * im, 2.0 * re * im
     for i_time in range(value.size):
-        total, time = 0.0, step * (i_time + 0.5)
+        total = 0.0
         for i in range(m):
             re, im = passing[0, i], passing[1, i]
             a, b = switch_re[i] * re - switch_im[i] * im, switch_re[i] * im + switch_im[i] * re
-            total += a * z[0, i] - b * z[1, i] + switch_re[i] * drift[i] * time
+            total += a * z[0, i] - b * z[1, i]
             if i < n_moving:
                 weight_re[i], weight_im[i] = a, -b
         value[i_time] = total

@@ -426,7 +426,7 @@ def _steps_of(points: OperatingPoints, index: Index) -> float:
         return float(points.speed_law(index).n_revolution * per_revolution)
     modal_steps = recording.longest_transient * _EVENT_STEPS + recording.revolutions * per_revolution
     if study.integrator.method == "modal":
-        is_closed = contact.closed_form == "always" and not study.has_bent_stator
+        is_closed = contact.are_laws_closed and contact.normal == "fixed" and not study.has_bent_stator
         return modal_steps if is_closed else _COLLOCATION * modal_steps
     like = index if points.has_few_rigs else (0,) * len(points.points.dims)
     turns = recording.longest_transient + recording.revolutions

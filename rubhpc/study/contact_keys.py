@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, TypedDict
+from typing import TYPE_CHECKING, TypedDict
 
 from rubhpc.input.fields import FieldError, check_fields, choice, quantity, series
 from rubhpc.input.quantity import WithUnit
@@ -13,13 +13,7 @@ from rubhpc.models import MODELS, chosen, default_of
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-ClosedForm = Literal["always", "never"]
-CLOSED_FORM: dict[str, ClosedForm] = {  # of friction laws
-    "sliding": "always",
-    "coulomb": "always",
-    "stribeck": "never",
-    "table": "never",
-}
+FRICTION_LAWS = "sliding", "coulomb", "stribeck", "table"
 # Keys of [contact] that belong to some laws only, and what their absence means there: None needs them.
 NEEDS_LAW: dict[str, tuple[str, tuple[str, ...], str]] = {
     "stiffness": ("law", ("penalty", "hertz"), "a multiplier has none"),
@@ -78,7 +72,7 @@ class ContactKeys:
         "Stribeck's, whose coefficient decays with the slip speed, or a table over the slip speed; "
         f"by default {default_of('friction_law')}.",
         example='"coulomb"',
-        of=tuple(CLOSED_FORM),
+        of=FRICTION_LAWS,
         default=None,
     )
     static_friction_ratio: float | None = quantity(
@@ -135,14 +129,9 @@ class ContactKeys:
                 raise FieldError(key, f"{problem}; remove one of them")
 
     @property
-    def closed_form(self) -> ClosedForm:
-        """When the modal scheme has a closed form of contact; elsewhere it is collocation."""
-        return "always" if self.normal == "fixed" and self.are_laws_closed else "never"
-
-    @property
     def are_laws_closed(self) -> bool:
-        """Whether the laws have a closed form along a fixed normal."""
-        return self.law != "hertz" and CLOSED_FORM[self.friction_law] == "always"
+        """Whether contact has a closed form along a fixed normal: multipliers, and steady sliding."""
+        return self.law == "lagrange" and self.friction_law == "sliding"
 
 
 class ContactArguments(TypedDict, total=False):

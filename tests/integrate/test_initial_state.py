@@ -14,9 +14,10 @@ from trial_rig import trial_rig
 from rubhpc import LumpedStator
 from rubhpc.errors import InputError
 from rubhpc.integrate.case import run_case
+from rubhpc.integrate.overlaps import gaps
 from rubhpc.integrate.record import State
 from rubhpc.integrate.setup import prepare
-from rubhpc.integrate.start import _least_forces, at_rest, fit_to_gaps, gaps
+from rubhpc.integrate.start import _least_forces, at_rest, fit_to_gaps
 from rubhpc.kernels.mode_change import GAP_TOLERANCE
 from rubhpc.study.initial import Initial
 from rubhpc.study.study import Integrator, Recording

@@ -11,8 +11,9 @@ from trial_rig import trial_rig
 
 from rubhpc.errors import InputError
 from rubhpc.fem.response import contact_free_amplitude
+from rubhpc.integrate.overlaps import gaps
 from rubhpc.integrate.setup import prepare
-from rubhpc.integrate.start import gaps, start_of
+from rubhpc.integrate.start import start_of
 from rubhpc.study.initial import Initial
 from rubhpc.study.tables import Integrator
 

@@ -16,8 +16,6 @@ SCHEMES = (
     "events",
     "neighbours",
     "periodic",
-    "stick and slip",
-    "periodic stick and slip",
     "run-up",
     "collocation",
     "central differences",
@@ -44,7 +42,6 @@ def use(scheme: str) -> None:
     case = {"speed_ratio": 0.75, "transient": 1, "samples_per_revolution": 32}
     options = {
         "events": {},
-        "stick and slip": {"friction_law": "coulomb"},
         "collocation": {"normal": "updated"},
         "central differences": {"method": "central-difference"},
     }
@@ -52,9 +49,8 @@ def use(scheme: str) -> None:
         _use_neighbours()
     elif scheme == "run-up":
         run_up("mokhtar2017", start="1500 rpm", stop="1600 rpm", time="0.1 s", clearance="0.1 mm")
-    elif scheme.startswith("periodic"):
-        law = {"friction_law": "coulomb"} if scheme.endswith("slip") else {}
-        periodic("mokhtar2017", **case, clearance_ratio=0.9, **law)
+    elif scheme == "periodic":
+        periodic("mokhtar2017", **case, clearance_ratio=0.9)
     else:
         simulate("mokhtar2017", **case, clearance_ratio=0.7, revolutions=2, **options[scheme])
 

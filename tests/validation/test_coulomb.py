@@ -13,7 +13,6 @@ from rubhpc import State
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import first_lateral_frequency
 from rubhpc.integrate.case import run_case
-from rubhpc.integrate.marches.friction import FrictionMarch
 from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import with_keys
 from rubhpc.schema import DIVERGED, DONE
@@ -188,23 +187,3 @@ def stiff_rub():
     recording = Recording(transient=0, revolutions=2, samples_per_revolution=64)
     record = run_case(setup, clearance=60e-6, friction=0.6, recording=recording)
     return record, np.array([record.vertical, record.horizontal, record.torsion, *record.stator_lateral])
-
-
-def test_contacts_that_chatter_are_left_to_collocation_for_a_millisecond(monkeypatch):
-    """Too many events when a case first touches: it goes on by collocation, then in closed form."""
-    exact, motion = stiff_rub()
-    kernel, is_done = FrictionMarch._kernel, []
-
-    def exhausted(march, *args):
-        if not is_done:
-            is_done.append(True)
-            march.progress.n_event, march.progress.counted_from = 10**6, march.progress.tick + 2**40
-        return kernel(march, *args)
-
-    monkeypatch.setattr(FrictionMarch, "_kernel", exhausted)
-    left, other = stiff_rub()
-    assert exact.left_closed_form == 0
-    assert left.left_closed_form == 1
-    assert left.steps < 15_000
-    assert left.energy_residual < 1e-3
-    assert abs(other - motion).max() < 1e-2 * abs(motion).max()

@@ -45,11 +45,11 @@ def staying_closed(case: Motion, revolutions: Iterable[Any]) -> Floats:
     contact more, without a gap or a force with a minimum of zero. The first row is the additional speed with
     which a pair would part for good (`kernels.mode_change`), over the speed of a whirl in the gap; impulses
     that hold it count as the speeds that they change. The second row is its force after the touch, N.
-    Infinite for a pair that stays closed at no touch, and for all pairs under a penalty, which has no
-    impacts. So are they without closed form, where contacts appear and vanish by gaps and forces alone.
+    Infinite for a pair that stays closed at no touch, and for all
+    pairs without closed form, where contacts appear and vanish by gaps and forces alone.
     """
     least = np.full((2, case.q), np.inf)
-    if not case.is_exact or case.bodies.spring > 0.0:
+    if not case.is_exact:
         return least
     whirl = abs(case.setup.spin) * max(float(case.bodies.clearance.max()), np.finfo(float).tiny)
     for revolution in revolutions:
@@ -61,10 +61,8 @@ def staying_closed(case: Motion, revolutions: Iterable[Any]) -> Floats:
             if not stays.any():
                 continue
             lacking, opening = _opening(case, piece, following.begin)
-            if case.has_states:
-                force = case.march.forces(mode.place, case.enter(mode, following.begin, piece.after))[stays]
-            else:  # decisive: impulses that hold a pair which would part for a moment come later
-                force = -np.linalg.pinv(case.bodies.delassus[np.ix_(stays, stays)]) @ opening[stays]
+            # Impulses that hold a pair which would part for a moment come later.
+            force = -np.linalg.pinv(case.bodies.delassus[np.ix_(stays, stays)]) @ opening[stays]
             for row, value in enumerate((lacking[stays] / whirl, force)):
                 least[row, stays] = np.minimum(least[row, stays], value)
     return least
@@ -79,7 +77,7 @@ def _opening(case: PiecewiseMotion, piece: Piece, time: float) -> tuple[Floats, 
     motion = piece.before.copy()
     if march.change(piece.states, piece.crossing, angle, motion, AT_ONCE * march.moment) < 0:
         return np.full(case.q, np.inf), np.zeros(case.q)
-    impulse = march.given[0]
+    impulse = march.given
     speed = bodies.gap_jacobian @ motion[n:]
     is_hit = (impulse > 0.0) & (np.abs(speed) <= max(AT_REST, OPENING))
     if is_hit.any():

@@ -63,8 +63,8 @@ class LeastGap:
     def gradient(self) -> Floats:
         """Derivative (2 n,) of the gap with respect to the motion at the section."""
         case = self.case
-        tables, j = case.mode(self.point.pieces[self._place].states).tables, _switch(case, self.pair)
-        row = tables.switch_re[j] + 1j * tables.switch_im[j]
+        tables = case.mode(self.point.pieces[self._place].states).tables
+        row = tables.switch_re[self.pair] + 1j * tables.switch_im[self.pair]
         row = row * np.exp((tables.exponent[0] + 1j * tables.exponent[1]) * self._time)
         gradient: Floats = tables.enter_re @ row.real - tables.enter_im @ row.imag
         return gradient @ tangents(case, self.point.revolutions)[self._place - 1] if self._place else gradient
@@ -98,7 +98,7 @@ def least_gap(point: Point, pair: int) -> LeastGap | None:
     pieces = point.pieces
     begins = [point.motion, *(piece.after for piece in pieces)]
     for place, (piece, begun) in enumerate(zip(pieces, begins, strict=False)):
-        if not case.mode(piece.states).is_open[pair]:
+        if case.mode(piece.states).is_closed[pair]:
             continue
         looks = np.linspace(0.0, piece.duration, max(8, int(LOOKS * piece.duration / case.turn)))
         gap, rate, _ = _gap(case, piece, begun, pair, looks)
@@ -125,24 +125,18 @@ def least_gap(point: Point, pair: int) -> LeastGap | None:
     )  # fmt: skip
 
 
-def _switch(case: PiecewiseMotion, pair: int) -> int:
-    """Row of the gap of a pair among the switch functions."""
-    return pair * int(case.n_switch // case.q)
-
-
 def _gap(
     case: PiecewiseMotion, piece: Piece, begun: Floats, pair: int, times: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """Gap of a pair and its first and second derivative at some times (k,), s, of a piece."""
     mode = case.mode(piece.states)
-    tables, j = mode.tables, _switch(case, pair)
+    tables = mode.tables
     re, im = case.enter(mode, piece.begin, begun)
     exponent = tables.exponent[0] + 1j * tables.exponent[1]
     terms = (re + 1j * im) * np.exp(np.multiply.outer(times, exponent))
-    row = tables.switch_re[j] + 1j * tables.switch_im[j]
-    drift = float(tables.switch_re[j] @ tables.drift)
+    row = tables.switch_re[pair] + 1j * tables.switch_im[pair]
     gap, rate, bend = (np.real(terms @ (row * exponent**k)) for k in range(3))
-    return gap + drift * times, rate + drift, bend
+    return gap, rate, bend
 
 
 def weakly_impacting(branching: Branching, free: Sequence[Point], share: float = DEPTH) -> Point:

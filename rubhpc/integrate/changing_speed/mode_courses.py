@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.integrate.reduced_model.mode_tables import growth_of
 from rubhpc.kernels.courses import Course, Courses, take_course
 from rubhpc.kernels.filling import ModeCourse
 from rubhpc.kernels.filling_energies import Losses
@@ -143,15 +142,7 @@ def weights(mode: ContactMode) -> Floats:
     return np.where(own > 1.5, 2.0, 1.0)
 
 
-def constant_course(
-    node: Node,
-    phasor: Complexes,
-    *,
-    n_ahead: int,
-    spring: float = 0.0,
-    gap: Floats,
-    clearance: Sequence[int] = (),
-) -> ModeCourse:
+def constant_course(node: Node, phasor: Complexes, *, n_ahead: int) -> ModeCourse:
     """A mode whose eigenmodes stay what they are.
 
     What drives them follows from the response to the unbalance at the speed for which the mode is solved.
@@ -162,14 +153,12 @@ def constant_course(
         Unbalance at unit speed.
     n_ahead : int
         Samples that are read from one set of coordinates.
-    spring : float, N/m
-        Stiffness of pressed springs, with `gap` (k, n) by reduced displacements and pairs `clearance`.
     """
     mode, m = node.mode, node.mode.n_eigenmode
     exponent, turning, is_pair = mode.exponent[:m], mode.exponent[m], weights(mode) > 1.5
     direct, other = mode.take_off[0, :m] - 1j * mode.take_off[1, :m], mode.take_off[0] + 1j * mode.take_off[1]
     mirrored, force = other[:m].conj(), abs(turning) ** 2
-    growing, switch = growth_of(mode), mode.switch
+    switch = mode.switch
     rubbed = node.resisting[:, m] - _response(node.resisting[:, :m], direct, mirrored, is_pair)
     return ModeCourse(
         n_coordinate=mode.exponent.size,
@@ -186,12 +175,6 @@ def constant_course(
             resisting_re=node.resisting.real.copy(),
             resisting_im=node.resisting.imag.copy(),
             rubbed=rubbed / force,
-            half=0.5 * spring,
-            gap=np.ascontiguousarray(gap),
-            clearance=m + 1 + np.array(clearance, dtype=np.int64),
-            one=growing.steady,
-            growing=growing.which,
-            speed=growing.speed,
         ),
         courses=NOTHING,
     )
@@ -229,7 +212,6 @@ def followed(course: ModeCourse, nodes: Sequence[Node], entered: Entries) -> Mod
     if middle.resisting.size:
         shape["resisting_re"] = [node.resisting.real for node in nodes]
         shape["resisting_im"] = [node.resisting.imag for node in nodes]
-        shape["speed"] = [growth_of(node.mode).speed for node in nodes]
     entry = {"drive": enter[:, :, n:] @ impulse, "mirrored_drive": enter[:, :, n:].conj() @ impulse}
     kept, views, places = _room({name: values[0] for name, values in (shape | entry).items()})
 

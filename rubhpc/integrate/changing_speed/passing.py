@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.integrate.case import march_of
+from rubhpc.integrate.case import MARCHES
 from rubhpc.integrate.changing_speed.range_library import RangeLibrary
 from rubhpc.integrate.marches.collocation import CollocationMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.marches.met_modes import NoClosedForm
-from rubhpc.integrate.marches.modal import ModalMarch, Place
+from rubhpc.integrate.marches.modal import Place
 from rubhpc.integrate.measuring.samples import empty_samples, following_accumulator, stacked_accumulators
 from rubhpc.integrate.record import State
 from rubhpc.kernels.accumulators import Accumulator, Samples
@@ -45,18 +45,20 @@ class Ended(NamedTuple):
     acceleration: float  # rad/s^2
 
 
-def carried(before: Ended, jump: float, march: EventDrivenMarch, setup: PieceSetup) -> Floats | None:
+def carried(
+    before: Ended, jump: float, march: EventDrivenMarch | CollocationMarch, setup: PieceSetup
+) -> Floats | None:
     """Coordinates (2, m) of the end of a piece in the modes of the next one; None where they have none.
 
     Parameters
     ----------
     jump : float, rad/s^2
         Sudden change of the acceleration.
-    march : EventDrivenMarch
+    march : EventDrivenMarch or CollocationMarch
         At the beginning of the next piece.
     """
     (mask, z), old, next_ = before.left, before.setup, march.library
-    if mask != march.moved_by(march.mask) or not isinstance(next_, RangeLibrary):
+    if mask != march.mask or not isinstance(next_, RangeLibrary):
         return None
     place = _inside(setup.held.within(old.spin))
     common = setup.held.reduced.spin + place * setup.held.reach
@@ -141,7 +143,7 @@ def take_stretch(
 
     Parameters
     ----------
-    march : EventDrivenMarch
+    march : EventDrivenMarch or CollocationMarch
         Whose case it is, at the beginning of the first of them (`begin_stretch`, whose library this is); it
         stands nowhere afterwards, until it begins again.
     block : Block
@@ -170,7 +172,7 @@ def take_stretch(
         n_part_sample=part,
         energy_limit=block.held.template.energy_limit,
         at=np.array([first, 0, TO_BEGIN, march.mask]),
-        moved_by=march.moved_by(-1) if library.follows(march.mask) else 0,
+        follows=library.follows(march.mask),
         left=march.reached_in()[1],
         motion=np.zeros((n_piece + 1, 2 * n)),
         pressing=np.zeros((n_piece + 1, q)),
@@ -216,7 +218,7 @@ def take_stretch(
         last=Accumulator._make(field[end * n_part] for field in sums),
         n_step=int(pieces.n_step.sum()),
         end=Place(pieces.motion[end].copy(), model.sag, pieces.pressing[end].copy()),
-        left=(march.moved_by(int(pieces.at[STANDING])), pieces.left),
+        left=(int(pieces.at[STANDING]), pieces.left),
     )
 
 
@@ -292,7 +294,7 @@ class Passing:
         `jump` (rad/s^2) is a sudden change of the acceleration.
         """
         march = self._march
-        if not isinstance(march, EventDrivenMarch) or before is None or not isinstance(begun, Place):
+        if march is None or before is None or not isinstance(begun, Place):
             return False
         if not (before.setup.held.is_followed and setup.held.is_followed):
             return False
@@ -307,7 +309,7 @@ class Passing:
 
     def ended(self, setup: PieceSetup, n_sample: int, acceleration: float) -> Ended | None:
         """End of the last piece in its own modes, if it has any; its acceleration is in rad/s^2."""
-        library = self._march.library if isinstance(self._march, EventDrivenMarch) else None
+        library = self._march.library if self._march is not None else None
         if self.left is None or not isinstance(library, RangeLibrary):
             return None
         mask, z = self.left
@@ -361,7 +363,9 @@ class Passing:
         """Duration, s, of the last piece or of the next one, whichever is longer."""
         return max(self._lasted, setup.interval * n_sample)
 
-    def _begin(self, setup: PieceSetup, n_sample: int, begun: State | Place, *, goes_on: bool) -> ModalMarch:
+    def _begin(
+        self, setup: PieceSetup, n_sample: int, begun: State | Place, *, goes_on: bool
+    ) -> EventDrivenMarch | CollocationMarch:
         """The march at the beginning of a piece."""
         march, at, self._at = self._march, self._at, None
         if march is not None and isinstance(begun, Place):
@@ -369,17 +373,19 @@ class Passing:
                 return march
             march.begin(setup, begun)
         else:
-            made = march_of(setup.scheme, setup)(setup, *self._case, state_at(begun, setup), self._check)
+            made = MARCHES[setup.scheme](setup, *self._case, state_at(begun, setup), self._check)
             assert isinstance(made, EventDrivenMarch | CollocationMarch)
             self._march = march = made
-            if goes_on and isinstance(march, EventDrivenMarch):
+            if goes_on:
                 mask, z = march.reached_in()
                 self.left = mask, np.zeros_like(z)
-        if goes_on and isinstance(march, EventDrivenMarch):
+        if goes_on:
             self._keep_fast(march, setup, n_sample)
         return march
 
-    def _keep_fast(self, march: EventDrivenMarch, setup: PieceSetup, n_sample: int) -> None:
+    def _keep_fast(
+        self, march: EventDrivenMarch | CollocationMarch, setup: PieceSetup, n_sample: int
+    ) -> None:
         """Let fast modes that follow the speed continue unchanged."""
         library = march.library
         if self.left is not None and isinstance(library, RangeLibrary) and library.follows(march.mask):
@@ -387,7 +393,7 @@ class Passing:
 
     def _pass(
         self,
-        march: ModalMarch,
+        march: EventDrivenMarch | CollocationMarch,
         setup: PieceSetup,
         n_sample: int,
         earlier: tuple[Accumulator, float],
@@ -408,7 +414,7 @@ class Passing:
             if reason is not None:
                 break
         gained = march.energy() - before if is_balanced else math.nan
-        self.left = march.reached_in() if isinstance(march, EventDrivenMarch) else None
+        self.left = march.reached_in()
         self._lasted = setup.interval * n_sample
         return Passed(samples.whole, accumulators, march.n_step, march.reached(), gained, reason or "")
 

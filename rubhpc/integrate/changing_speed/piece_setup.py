@@ -12,7 +12,7 @@ from rubhpc.fem.probes import probes_at, seen_at_rest
 from rubhpc.fem.statics import at_rest_under
 from rubhpc.integrate.changing_speed.mode_courses import between
 from rubhpc.integrate.changing_speed.range_library import AT_ONCE, RangeLibrary, TableBuffer
-from rubhpc.integrate.modal_setup import Kind, ModalSetup
+from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.reduced_model.flight_modes import FlightModes
 from rubhpc.integrate.reduced_model.system_modes import KeptParts
 
@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.reduced_model.contact_mode import SlidingPairs
-    from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs
     from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
     from rubhpc.integrate.reduced_model.system_modes import Solved
@@ -72,7 +70,7 @@ class HeldMatrices:
         self.acceleration, self.momentum = acceleration, momentum
         self._phasor, self._reach = phasor, reach
         self._slope = slope  # N m s, of a drive's torque over the speed
-        self._libraries: dict[tuple[Kind, float], RangeLibrary] = {}
+        self._libraries: dict[float, RangeLibrary] = {}
         self._latest: tuple[tuple[float, ...], Model] | None = None  # by request
         self.first: tuple[tuple[float, ...], object] | None = None  # block of a case, by what was asked
 
@@ -140,16 +138,14 @@ class HeldMatrices:
             self._latest = asked, sagging(self.model, sag, film, rows)
         return self._latest[1]
 
-    def tuned(self, kind: Kind, piece: PieceSetup, friction: float) -> RangeLibrary:
+    def tuned(self, piece: PieceSetup, friction: float) -> RangeLibrary:
         """Contact modes of a friction, tuned to a piece and valid until another one requests them."""
-        if (kind, friction) not in self._libraries:
-            if any(known != friction for _, known in self._libraries):  # of earlier cases
-                self._libraries.clear()
-            self._libraries[kind, friction] = RangeLibrary(
+        if friction not in self._libraries:
+            self._libraries.clear()  # of earlier cases
+            self._libraries[friction] = RangeLibrary(
                 self.reduced,
                 self.model,
                 friction,
-                pairs=piece.pairs_of_range(kind, friction),
                 phasor=self._phasor,
                 known=self.kept,
                 tick=piece.tick,
@@ -162,7 +158,7 @@ class HeldMatrices:
                 is_balanced=self.is_balanced,
                 at_once=self.at_once,
             )
-        library = self._libraries[kind, friction]
+        library = self._libraries[friction]
         library.tune(piece.speeds, piece.place)
         return library
 
@@ -225,7 +221,7 @@ class PieceSetup(ModalSetup):
 
     def _overlap(self, made: Reduced, clearance: Floats) -> float:
         """Overlap, m, that modes which follow the speed may leave as a pair opens, without an event."""
-        if not self.held.is_followed or made.spring:
+        if not self.held.is_followed:
             return made.overlap
         return max(made.overlap, float(self.accuracy * np.abs(clearance[: len(self.model.stators)]).min()))
 
@@ -238,7 +234,7 @@ class PieceSetup(ModalSetup):
         return found
 
     def _solve_flight(self) -> FlightModes:
-        library = self.held.tuned("sliding", self, 0.0)
+        library = self.held.tuned(self, 0.0)
         modes = library.eigenmodes(0, min(max(self.within, -1.0), 1.0))
         assert modes is not None
         turning, factor = complex(self.clock.growth, self.spin), complex(self.speeds.factor[self.place])
@@ -253,15 +249,9 @@ class PieceSetup(ModalSetup):
             response,
         )
 
-    def _find(self, kind: Kind, friction: float) -> ModeLibrary:
-        return self.held.tuned(kind, self, friction)
-
-    def pairs_of_range(self, kind: Kind, friction: float) -> SlidingPairs | FrictionPairs:
-        """The pairs of a kind and a friction in the middle of the range."""
-        held = self.held
-        return with_values(self, reduced=held.reduced, model=held.model, spin=held.reduced.spin)._pairs(
-            kind, friction
-        )
+    def library(self, friction: float) -> ModeLibrary:
+        """Contact modes of a friction, tuned to the piece."""
+        return self.held.tuned(self, friction)
 
 
 def with_values(instance: D, **values: Any) -> D:

@@ -100,7 +100,6 @@ class Block:
             clock=template.clock._replace(spin=spin, tick=tick, search_level=search, growth=growth),
             speeds=speeds,
             place=place,
-            _open_tables={},  # which are of this speed alone
         )
 
 

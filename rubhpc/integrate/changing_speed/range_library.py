@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from copy import copy
-from dataclasses import replace
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
@@ -16,7 +15,6 @@ from numpy.typing import NDArray
 
 from rubhpc.integrate.changing_speed.mode_courses import (
     MOST_LOST,
-    NODES,
     Eigenmodes,
     Node,
     constant_course,
@@ -24,7 +22,6 @@ from rubhpc.integrate.changing_speed.mode_courses import (
     followed,
     matched,
 )
-from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary, width_without_modes
 from rubhpc.integrate.reduced_model.mode_tables import energies_of
 from rubhpc.integrate.reduced_model.table_stack import TableStack
@@ -39,7 +36,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.reduced_model.contact_mode import ContactMode, SlidingPairs
+    from rubhpc.integrate.reduced_model.contact_mode import ContactMode
     from rubhpc.integrate.reduced_model.mode_tables import Energies
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
     from rubhpc.integrate.reduced_model.system_modes import Solved
@@ -169,7 +166,6 @@ class RangeLibrary(ModeLibrary):
         model: Model,
         friction: float,
         *,
-        pairs: SlidingPairs | FrictionPairs | None = None,
         phasor: Complexes,
         known: Solved,
         tick: float,
@@ -186,21 +182,21 @@ class RangeLibrary(ModeLibrary):
         self.reduced, self._known, self._reach = _struck(reduced, phasor), known, reach
         self._spin = reduced.spin
         self._is_measured, self._at_place, self._at_once = is_balanced, at_place, at_once
-        self._take_pairs(model, friction, pairs)
+        self._take_pairs(model, friction)
         self._tick, self._sample_level, self._n_level = tick, sample_level, n_level
         self._phasor, self._output = phasor, np.hstack(output_operators(reduced))
         self._among: OpenBodies | None = None
         self._opened, self._is_open = self._solve(0), True
         self._among = open_bodies(reduced, model, self._opened)
         self.first_masks = [0]
-        self.width = self._width_of(model, friction)
+        self.width = width_without_modes(reduced, model, friction, self._opened.exponent.size)
         self._is_followed = bool(beside)
-        self._beside = [self._with(*other) for other in self._others(beside)]
+        self._beside = [self._with(other) for other in beside]
         self._exponents = {}
         self._held: dict[int, tuple[ModeTables, ModeCourse]] = {}  # by the set of closed pairs
         self._strange: set[int] = set()  # modes that cannot be followed
         self._counted: tuple[tuple[int, ...], int] = (), 0  # modes, and their memory, bytes
-        kind: tuple[object, ...] = type(self), type(pairs), self.width, n_level, is_balanced
+        kind: tuple[object, ...] = type(self), self.width, n_level, is_balanced
         buffer = TableBuffer(TableStack(1 + len(self.gap_jacobian), self._most_modes))
         self._buffer = buffer if buffers is None else buffers.setdefault(kind, buffer)
         self._tables = self._buffer.tables
@@ -302,12 +298,7 @@ class RangeLibrary(ModeLibrary):
         return True
 
     def eigenmodes(self, mask: int, within: float) -> Eigenmodes | None:
-        """Those of a set of closed pairs at a place in the range, from -1 to 1.
-
-        None where a speed changes what enters them otherwise, as that of rims does, or it has no room.
-        """
-        if isinstance(self._pairs, FrictionPairs) and self._pairs.closed(mask):
-            return None
+        """Those of a set of closed pairs at a place in the range, from -1 to 1; None where it has no room."""
         if mask not in self._held and self.is_full:
             self.forget()
         if not self._has(mask) or mask in self._strange:
@@ -382,7 +373,7 @@ class RangeLibrary(ModeLibrary):
     def _solve_at(self, mask: int, place: int, within: float) -> None:
         """Solve a mode that cannot be followed at a place in the range, and put it into the buffer."""
         assert self._at_place is not None
-        library = self._with(self._at_place(within), within)
+        library = self._with(self._at_place(within))
         node = library._node(library._solved(mask))
         row, _ = self._held[mask] = without_filled(node.row, len(self._output)), library._constant(node)
         for field, new in zip(self.tables(), row, strict=True):
@@ -395,7 +386,7 @@ class RangeLibrary(ModeLibrary):
         shape, rate = mode.motion[:n], mode.motion[n:]
         resisting = np.zeros((0, mode.exponent.size), dtype=np.complex128)
         if self._is_measured:
-            reduced, friction = self._pairs.damped(self.reduced, mode.mask), self._friction_of(mode)
+            reduced, friction = self.reduced, self._friction_of(mode)
             skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
             resisting = reduced.damping @ rate + skew @ shape
             if friction is not None:
@@ -406,32 +397,13 @@ class RangeLibrary(ModeLibrary):
 
     def _constant(self, node: Node) -> ModeCourse:
         """A mode that stays what it is."""
-        mask = node.mode.mask
-        closed, spring = self._pairs.closed(mask), self._pairs.stiffness if self._is_measured else 0.0
-        pressed = closed if spring else []
-        return constant_course(
-            node,
-            self._phasor,
-            n_ahead=1 if closed else SAMPLES_AT_ONCE,
-            spring=spring,
-            gap=self.gap_jacobian[pressed],
-            clearance=pressed,
-        )
+        return constant_course(node, self._phasor, n_ahead=1 if node.mode.mask else SAMPLES_AT_ONCE)
 
-    def _others(self, beside: Sequence[ReducedModel]) -> list[tuple[ReducedModel, float]]:
-        """Matrices beside those in the middle, or the same with rims at other speeds; places in the range."""
-        if isinstance(self._pairs, FrictionPairs) and not beside:
-            beside = [self.reduced] * (len(NODES) - 1)
-        return list(zip(beside, NODES[1:], strict=False))
-
-    def _with(self, reduced: ReducedModel, place: float = 0.0) -> Self:
-        """A library with other matrices, at a place in the range, that solves in the same way."""
+    def _with(self, reduced: ReducedModel) -> Self:
+        """A library with other matrices that solves in the same way."""
         other = copy(self)
         other.reduced, other._output = _struck(reduced, self._phasor), np.hstack(output_operators(reduced))
         other._beside, other._is_open = [], False
-        if isinstance(self._pairs, FrictionPairs):  # the speed of the rims goes with that of the shaft
-            share = 1.0 + place * self._reach / self._spin
-            other._pairs = replace(self._pairs, rim_speed=self._pairs.rim_speed * share)
         return other
 
     def _solved(self, mask: int) -> ContactMode:
@@ -442,16 +414,7 @@ class RangeLibrary(ModeLibrary):
 
     def _energies_of(self, mode: ContactMode) -> Energies:
         """Energies of a mode, whose order is not that of open bodies."""
-        found = energies_of(
-            mode, self._pairs.damped(self.reduced, mode.mask), self._friction_of(mode), self.width
-        )
-        return self._with_springs(found, mode)
-
-    def _width_of(self, model: Model, friction: float) -> int:
-        """Width of tables for any mode that is met later."""
-        if isinstance(self._pairs, FrictionPairs):
-            return self._width([self._opened.exponent.size])
-        return width_without_modes(self.reduced, model, friction, self._opened.exponent.size)
+        return energies_of(mode, self.reduced, self._friction_of(mode), self.width)
 
 
 def _struck(reduced: ReducedModel, phasor: Complexes) -> ReducedModel:

@@ -88,4 +88,4 @@ def moved(motion: State | Place, setup: PieceSetup, displacement: Floats, veloci
     reduced = motion.motion.copy()
     n = reduced.size // 2
     reduced[n:] += setup.reduced.project[:, : velocity.size] @ velocity
-    return Place(reduced, motion.sag + displacement, motion.contact_force)
+    return motion._replace(motion=reduced, sag=motion.sag + displacement)

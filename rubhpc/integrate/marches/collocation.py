@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rubhpc.integrate.marches.march import ALL_SAMPLES, NO_FORCES
-from rubhpc.integrate.marches.modal import ModalMarch
+from rubhpc.integrate.marches.modal import ModalMarch, slowest_fast
 from rubhpc.integrate.measuring.samples import no_record
-from rubhpc.kernels.case_progress import LONG_AGO, PAUSED, follow, restart_clock, shaft_turn
+from rubhpc.integrate.overlaps import with_overlap
+from rubhpc.kernels.case_progress import LONG_AGO, PAUSED, restart_clock, shaft_turn
 from rubhpc.kernels.collocation.flight import LEAST_GAP
 from rubhpc.kernels.collocation.march import LEAST_SCALE, SETTLED, advance_by_collocation
 from rubhpc.kernels.collocation.observing import Seen
@@ -33,17 +35,24 @@ from rubhpc.kernels.sampling import Measured
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
     from rubhpc.integrate.marches.modal import Place
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.record import State
     from rubhpc.integrate.reduced_model.flight_modes import FlightModes
+    from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
     from rubhpc.kernels.accumulators import Accumulator, Samples
-    from rubhpc.kernels.case_progress import Clock, Progress
-    from rubhpc.kernels.sampling import Recorder
 
-    Floats = NDArray[np.float64]
+Floats = NDArray[np.float64]
+
+
+class Contacts(NamedTuple):
+    """Contacts of a case at the end of a piece."""
+
+    state: NDArray[np.int64]  # (q,)
+    force: Floats  # (q, 2, s), N
+    lasting: Floats  # (q,), s
+    age: Floats  # (q,), s, of the states
+    memory: NDArray[Any]  # (1,)
 
 WHY = {  # a case cannot continue
     0: "the motion diverges",
@@ -67,7 +76,7 @@ class CollocationMarch(ModalMarch):
     ) -> None:
         """Start from `initial`, with the contacts closed that its forces press."""
         super().__init__(setup, clearance, friction, initial, check)
-        self._friction = friction
+        self._friction, self._at_clearance = friction, clearance
         self._seen: Seen | None = None
         self._sizes: tuple[object, ...] = ()
         self.accuracy = setup.accuracy
@@ -102,24 +111,53 @@ class CollocationMarch(ModalMarch):
     def begin(self, setup: ModalSetup, place: Place) -> None:
         """Begin anew at another speed in the same reduced coordinates, from where a march has come.
 
-        Contacts keep their states.
+        Contacts are those of the place.
         """
         self.n_step, self.sample, self._stride = 0, 0, ALL_SAMPLES
-        tick, state, memory = int(self.progress.tick), self._case.state.copy(), self._memory.copy()
-        force, lasting, age = (
-            self._case.force,
-            self._case.lasting,
-            (tick - self._case.since) * self.clock.tick,
-        )
         self._take(setup)
         self._motion[:] = self.moved(setup, place)
         self._use_modes(setup)
         self._begin(place.contact_force)
-        self._case.state[:], self._case.force[:], self._case.lasting[:] = state, force, lasting
-        self._case.since[:] = -np.round(age / self.clock.tick).astype(np.int64)
-        self._memory["is_new"] = 0
-        for name in ("slot", "scale", "fastest", "unseen"):
-            self._memory[name] = memory[name]
+        if place.contacts is not None:
+            contacts = cast("Contacts", place.contacts)
+            self._case.state[:], self._case.force[:] = contacts.state, contacts.force
+            self._case.lasting[:] = contacts.lasting
+            self._case.since[:] = -np.round(contacts.age / self.clock.tick).astype(np.int64)
+            self._memory["is_new"] = 0
+            for name in ("slot", "scale", "fastest", "unseen"):
+                self._memory[name] = contacts.memory[name]
+
+    def reached(self) -> Place:
+        """Present motion and contacts, for another speed to continue from."""
+        case = self._case
+        contacts = Contacts(
+            state=case.state.copy(),
+            force=case.force.copy(),
+            lasting=case.lasting.copy(),
+            age=(int(self.progress.tick) - case.since).astype(np.float64) * self.clock.tick,
+            memory=self._memory.copy(),
+        )
+        return super().reached()._replace(contacts=contacts)
+
+    @property
+    def mask(self) -> int:
+        """Set of contacts whose modes are the coordinates: none."""
+        return 0
+
+    @property
+    def library(self) -> ModeLibrary:
+        """Where the modes of a piece come from."""
+        return self._setup.library(0.0)
+
+    def reached_in(self) -> tuple[int, Floats]:
+        """The set of contacts `mask`, and a copy of the modal coordinates (2, m), of which none is real."""
+        return 0, self._case.x.reshape(2, -1).copy()
+
+    def keep_fast(self, before: tuple[int, Floats], spin: float, since: float) -> None:
+        """Let fast modes go on as they were before a piece (`EventDrivenMarch.keep_fast`)."""
+        z, fast = self._case.x.reshape(2, -1), np.abs(self._contacts.exponent) > slowest_fast(spin, since)
+        fast[-1] = False  # the response to the unbalance
+        z[:, fast] = before[1][:, : fast.size][:, fast]
 
     def start_again(self, state: State) -> bool:
         """Restart the same case at another state."""
@@ -200,31 +238,14 @@ class CollocationMarch(ModalMarch):
         """State of each pair, (q,)."""
         return self._case.state.copy()
 
-    def take_over(
-        self,
-        clock: Clock,
-        progress: Progress,
-        recorder: Recorder,
-        motion: Floats,
-        closed: NDArray[np.bool_],
-    ) -> None:
-        """Continue the record of another march at its tick, with its motion (2 n,) and closed pairs (q,)."""
-        self.clock, self._recorder = clock, recorder
-        follow(self.progress, progress)
-        self._motion[:] = motion
-        self._begin(closed.astype(float), shaft_turn(clock, self.progress.tick))
-
-    def advance_to(
-        self, last_tick: int, clock: Clock, samples: Samples, accumulator: Accumulator, is_recorded: bool
-    ) -> int:
-        """Advance to a tick for another march; returns an outcome of `kernels.case_progress`."""
-        self.clock = clock
-        return self._kernel(last_tick, samples, accumulator, is_recorded)
-
     def motion(self) -> Floats:
         """Reduced displacements, then velocities (2 n,), at the sample reached."""
         motion: Floats = self._modes.motion @ self._case.x
         return motion
+
+    def state_of(self, motion: Floats, contact_force: Floats) -> State:
+        """State of a reduced motion (2 n,), with the overlap of its gaps: springs press by it."""
+        return with_overlap(super().state_of(motion, contact_force), self._setup, self._at_clearance)
 
     def touching(self) -> NDArray[np.bool_]:
         """Whether each pair is closed, (q,)."""

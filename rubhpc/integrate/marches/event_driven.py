@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rubhpc.integrate.marches.contact_sets import ContactSets
 from rubhpc.integrate.marches.march import ALL_SAMPLES
 from rubhpc.integrate.marches.met_modes import MetModes, NoClosedForm
+from rubhpc.integrate.marches.modal import ModalMarch, slowest_fast
+from rubhpc.integrate.measuring.samples import no_record
 from rubhpc.kernels.case_progress import FINISHED, MODE_WANTED, NO_SECTIONS, PAUSED, Sections, restart_clock
-from rubhpc.kernels.contact_modes import DYING
+from rubhpc.kernels.contact_modes import DYING, FORCED_LEVEL
 from rubhpc.kernels.event_loop import advance
-from rubhpc.kernels.mode_change import event_work
+from rubhpc.kernels.mode_change import EventWork, change_contacts, event_work
 from rubhpc.kernels.piece_loop import advance_pieces
-from rubhpc.kernels.pieces import FAST, QUICK
 from rubhpc.kernels.sampling import Measured
 from rubhpc.kernels.trail import Trail, begin_trail, new_trail, no_trail
 
@@ -38,7 +38,7 @@ LOST, LEAST = 100.0, 1e-10  # of the overlap that is allowed; m
 MOST_STEPS = 20.0  # of a piece, over those of the event search: with more, its events have no end
 
 
-class EventDrivenMarch(ContactSets):
+class EventDrivenMarch(ModalMarch):
     """A case that goes from one contact mode to another; `NoClosedForm` leaves it to collocation."""
 
     def __init__(
@@ -64,17 +64,15 @@ class EventDrivenMarch(ContactSets):
 
     def reached_in(self) -> tuple[int, Floats]:
         """Set of contacts in which the case stands, and a copy of its modal coordinates (2, m)."""
-        return self.moved_by(self.mask), self._z.copy()
+        return self.mask, self._z.copy()
 
     def has_lost_events(self, n_step: int, lasts: float, motion: Floats, closed: NDArray[np.bool_]) -> bool:
         """Whether a piece of a duration (s) took far more steps than short ones, or missed an event.
 
         Then a pair that is not `closed` (q,) overlaps at its end by far more than an event leaves.
         """
-        bodies, q = self.bodies, self._clearance.size
-        if bodies.spring:
-            return False
-        gap = bodies.clearance[:q] + bodies.gap_jacobian @ motion[: motion.size // 2]
+        bodies = self.bodies
+        gap = bodies.clearance + bodies.gap_jacobian @ motion[: motion.size // 2]
         deepest = float(gap[~closed].min(initial=0.0))
         is_endless = n_step > MOST_STEPS * lasts / self._setup.step
         return is_endless or deepest < -LOST * max(bodies.overlap, LEAST)
@@ -87,8 +85,8 @@ class EventDrivenMarch(ContactSets):
         Modes follow the speed, which changes evenly, and do not ring for it (`kernels.pieces.begin_piece`).
         """
         mask, z = before
-        if self.moved_by(self.mask) == mask:
-            self._keep(z, max(FAST * abs(spin), QUICK / since))
+        if self.mask == mask:
+            self._keep(z, slowest_fast(spin, since))
 
     def _keep(self, z: Floats, slowest: float) -> None:
         """Let modes with a pace above `slowest`, 1/s, have the coordinates (2, m)."""
@@ -111,7 +109,7 @@ class EventDrivenMarch(ContactSets):
 
     def _enter_first(self, contact_force: Floats) -> None:
         """Enter the contact mode with which the case begins; forces (q,), N."""
-        self._modes.begin_piece(self._find_library(self._setup, self._coefficient))
+        self._modes.begin_piece(self._setup.library(self._coefficient))
         self._enter(self._first_mask(contact_force))
 
     def _enter(self, mask: int) -> None:
@@ -219,10 +217,6 @@ class EventDrivenMarch(ContactSets):
     def _note_in(self, trail: Trail) -> None:
         self._event_work = self._event_work._replace(trail=trail)
 
-    def _find_library(self, setup: ModalSetup, friction: float) -> ModeLibrary:
-        """Contact modes of the case."""
-        return setup.library(friction)
-
     def _first_mask(self, contact_force: Floats) -> int:
         """Set of the contacts with which the case begins."""
         return sum(1 << i for i, force in enumerate(contact_force) if force > 0.0)
@@ -300,10 +294,88 @@ class EventDrivenMarch(ContactSets):
     def _contact_force(self) -> Floats:
         return self.forces(self._bare_progress["mode"], self._z)
 
-    def state_of(self, motion: Floats, contact_force: Floats) -> State:
-        """State of a reduced motion (2 n,); under a penalty its gaps overlap."""
-        state = super().state_of(motion, contact_force)
-        if not self.bodies.spring:
-            return state
-        gap = self._clearance + self.bodies.gap_jacobian @ motion[: motion.size // 2]
-        return replace(state, overlap=np.maximum(-gap, 0.0))
+    @property
+    def library(self) -> ModeLibrary:
+        """Contact modes of the case."""
+        return self._modes.library
+
+    @property
+    def mask(self) -> int:
+        """Present set of closed pairs."""
+        return int(self.tables.mask[self._bare_progress["mode"]])
+
+    def touching(self) -> NDArray[np.bool_]:
+        """Whether each pair is closed, (q,)."""
+        return self.closed(self.mask)
+
+    def closed(self, mask: int) -> NDArray[np.bool_]:
+        """Whether each pair is closed in a contact mode, (q,)."""
+        return _are_set(mask, self._clearance.size)
+
+    @property
+    def given(self) -> Floats:
+        """Impulses (q,), N s, of the last event by `change`."""
+        return self.change_work[0].given
+
+    def forces(self, mode: int, z: Floats) -> Floats:
+        """Forces (q,), N, at coordinates (2, m) of a contact mode, given by its index in the tables."""
+        is_closed = self.closed(int(self.tables.mask[mode]))
+        if not is_closed.any():
+            return np.zeros(is_closed.size)
+        force = self.tables.switch_re[mode] @ z[0] - self.tables.switch_im[mode] @ z[1]
+        return np.where(is_closed, force, 0.0)
+
+    def exponents(self, mask: int) -> Floats:
+        """Exponents of the coordinates of a contact mode (`ModeLibrary.exponents`)."""
+        return self.library.exponents(mask)
+
+    @property
+    def derived(self) -> dict[int, Any]:
+        """Derived data of the contact modes, kept with their tables (`ModeLibrary.derived`)."""
+        return self.library.derived
+
+    @property
+    def moment(self) -> float:
+        """Time, s: a pair that would part for less than that at an event stays closed."""
+        return float(self.clock.tick * 2**FORCED_LEVEL)
+
+    def change(
+        self, mask: int, crossing: int, angle: float, motion: Floats, moment: float | None = None
+    ) -> int:
+        """Compute an event: `motion` (2 n,) after it, in place; returns the contact mode afterwards, or -1.
+
+        `crossing` are the switch functions that vanish, `angle` (rad) is that of the shaft; `moment` (s) is
+        by default `self.moment`.
+        """
+        return int(
+            change_contacts(
+                self.bodies,
+                mask,
+                crossing,
+                self.clock.spin,
+                self.moment if moment is None else moment,
+                np.cos(angle),
+                np.sin(angle),
+                motion,
+                False,
+                *self.change_work,
+            )
+        )
+
+    @cached_property
+    def change_work(self) -> tuple[EventWork, Accumulator]:
+        """Work space of `change` (`change_contacts`)."""
+        return event_work(self._clearance.size), self._unrecorded
+
+    @property
+    def _unrecorded(self) -> Accumulator:
+        """Accumulator for events that are not recorded."""
+        return no_record(self.n_place, self._clearance.size)[1]
+
+
+@lru_cache
+def _are_set(mask: int, q: int) -> NDArray[np.bool_]:
+    """Whether each of the lowest bits is set, (q,)."""
+    found = np.array([bool(mask >> i & 1) for i in range(q)])
+    found.flags.writeable = False
+    return found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numba import config
@@ -26,6 +26,7 @@ from rubhpc.kernels.case_progress import (
     restart_clock,
 )
 from rubhpc.kernels.contact_modes import enter_with, is_within
+from rubhpc.kernels.pieces import FAST, QUICK
 from rubhpc.kernels.sampling import recorder, with_coordinates
 
 if TYPE_CHECKING:
@@ -49,6 +50,12 @@ class Place(NamedTuple):
     motion: Floats  # (2 n,), reduced displacements about the sag, then velocities
     sag: Floats  # (n_rotor_dof,), m and rad
     contact_force: Floats  # (q,), N
+    contacts: Any = None  # what the march keeps of its contacts besides
+
+
+def slowest_fast(spin: float, since: float) -> float:
+    """Pace, 1/s, above which modes follow the speed from piece to piece (`kernels.pieces.begin_piece`)."""
+    return max(FAST * abs(spin), QUICK / since)
 
 
 class ModalMarch(March):
@@ -155,10 +162,6 @@ class ModalMarch(March):
     def motion(self) -> Floats:
         """Reduced displacements, then velocities (2 n,), at the sample reached."""
         return self._motion_in(self._bare_progress["mode"], self._z)
-
-    def motion_of(self, progress: Progress, z: Floats) -> Floats:
-        """Reduced displacements, then velocities (2 n,), of modal coordinates (2, m)."""
-        return self._motion_in(progress.mode, z)
 
     def _motion_in(self, mode: int, z: Floats) -> Floats:
         motion: Floats = self.tables.motion_re[mode] @ z[0] - self.tables.motion_im[mode] @ z[1]

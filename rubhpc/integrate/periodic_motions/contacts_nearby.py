@@ -59,14 +59,13 @@ def _watch(
 ) -> tuple[NDArray[np.int64], Floats, Floats]:
     """Parts, values and changes of what is watched along the pieces of a period."""
     n_time = np.maximum(3, np.rint(PER_REVOLUTION * rows.times[:, 1] / piecewise.turn).astype(np.int64))
-    watching = begin_watching(motion, n_time, piecewise.n_switch, piecewise.room.ahead.shape[1])
+    watching = begin_watching(motion, n_time, piecewise.q, piecewise.room.ahead.shape[1])
     piece = 0
     while piece != ALL_CARRIED:
         piecewise.mode(int(rows.states[piece, 0]))
         piece = watch_pieces(
             piecewise.known,
             piecewise.bodies,
-            piecewise.has_states,
             piecewise.setup.spin,
             rows,
             watching,

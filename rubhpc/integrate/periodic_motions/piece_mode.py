@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels.case_progress import NONE
 from rubhpc.kernels.flow import PieceTables
-from rubhpc.kernels.mode_change import GAP_TOLERANCE
 from rubhpc.kernels.revolutions import PieceModes
 
 if TYPE_CHECKING:
@@ -26,29 +24,25 @@ class Mode(NamedTuple):
     ----------
     place : int
         In the tables of the march.
-    is_closed, is_open : (q,)
-        Pairs that are closed, and those that are watched for their gap.
-    gaps : int
-        Bits of the switch functions that are gaps.
+    is_closed : (q,)
+        Whether each pair is closed.
     n_moving : int
         Coordinates up to the last that moves with the motion.
     tables : PieceTables
         What a piece is followed with.
-    unit_length : (l, 2, m)
-        Coordinates besides for each unit length: the clearances, and a 1 under set-valued friction.
+    unit_length : (q, 2, m)
+        Coordinates besides for a unit clearance of each pair.
     """
 
     place: int
     is_closed: NDArray[np.bool_]
-    is_open: NDArray[np.bool_]
-    gaps: int
     n_moving: int
     tables: PieceTables
     unit_length: Floats
 
 
 def mode_of(march: EventDrivenMarch, states: int) -> Mode:
-    """Return the mode of a march with pairs in these states, which its tables hold."""
+    """Return the mode of a march with these pairs closed, which its tables hold."""
     if states not in march.derived:
         march.derived[states] = _read_mode(march, states)
     mode: Mode = march.derived[states]
@@ -65,11 +59,10 @@ def mode_of(march: EventDrivenMarch, states: int) -> Mode:
 
 def unknown_modes(tables: ModeTables) -> PieceModes:
     """Return the contact modes of tables for whole revolutions, none of them known yet (`know`)."""
-    p, n_switch, m = tables.switch_re.shape
+    p, _, m = tables.switch_re.shape
     return PieceModes(
         mask=tables.mask,
         is_known=np.zeros(p, dtype=np.bool_),
-        gaps=np.empty(p, dtype=np.int64),
         n_moving=np.empty(p, dtype=np.int64),
         switch_re=tables.switch_re,
         switch_im=tables.switch_im,
@@ -79,9 +72,6 @@ def unknown_modes(tables: ModeTables) -> PieceModes:
         power_re=tables.power_re,
         power_im=tables.power_im,
         exponent=np.empty((p, 2, m)),
-        drift=np.empty((p, m)),
-        floor=np.empty((p, n_switch)),
-        kind=np.empty((p, n_switch), dtype=np.int64),
         enter_re=tables.enter_re,
         enter_im=tables.enter_im,
         offset=np.empty((p, 2, 3, m)),
@@ -93,10 +83,8 @@ def unknown_modes(tables: ModeTables) -> PieceModes:
 def know(modes: PieceModes, mode: Mode) -> None:
     """Fill in the row of a mode."""
     place, tables = mode.place, mode.tables
-    modes.gaps[place], modes.n_moving[place] = mode.gaps, mode.n_moving
-    modes.exponent[place], modes.drift[place] = tables.exponent, tables.drift
-    modes.floor[place], modes.kind[place] = tables.floor, tables.kind
-    modes.offset[place] = tables.offset
+    modes.n_moving[place] = mode.n_moving
+    modes.exponent[place], modes.offset[place] = tables.exponent, tables.offset
     modes.is_known[place] = True
 
 
@@ -104,13 +92,6 @@ def _read_mode(march: EventDrivenMarch, states: int) -> Mode:
     """Take a mode from the tables of a march, for no clearance."""
     tables = march.tables
     place = int(np.flatnonzero(tables.mask == states)[0])
-    exponent, drift = march.exponents(states)
-    is_closed, is_open = march.closed(states), march.opened(states)
-    floor = np.where(is_closed, 0.0, -GAP_TOLERANCE)
-    kind = np.where(is_open, 0, np.where(is_closed, 1, NONE))
-    if tables.switch_re.shape[1] > is_closed.size:
-        floor = np.stack([floor, np.where(is_closed, 0.0, -np.inf)], axis=1).ravel()
-        kind = np.stack([kind, np.full(kind.size, NONE)], axis=1).ravel()
     first = tables.n_eigenmode[place]
     offset = np.zeros((2, 3, tables.switch_re.shape[2]))
     offset[:, 0], offset[:, 1] = -tables.enter_cosine[place], -tables.enter_sine[place]
@@ -120,6 +101,7 @@ def _read_mode(march: EventDrivenMarch, states: int) -> Mode:
     for i, length in enumerate(unit_length):
         length[0, first + 1 + i] = 1.0
     followed = PieceTables(
+        closed=states,
         switch_re=tables.switch_re[place],
         switch_im=tables.switch_im[place],
         rate_re=tables.rate_re[place],
@@ -127,10 +109,7 @@ def _read_mode(march: EventDrivenMarch, states: int) -> Mode:
         bound=tables.bound[place],
         power_re=tables.power_re[place],
         power_im=tables.power_im[place],
-        exponent=exponent,
-        drift=drift,
-        floor=floor,
-        kind=kind,
+        exponent=march.exponents(states),
         enter_re=tables.enter_re[place],
         enter_im=tables.enter_im[place],
         offset=offset,
@@ -142,9 +121,7 @@ def _read_mode(march: EventDrivenMarch, states: int) -> Mode:
     is_moving = (followed.enter_re != 0.0).any(axis=0) | (followed.enter_im != 0.0).any(axis=0)
     return Mode(
         place=place,
-        is_closed=is_closed,
-        is_open=is_open,
-        gaps=march.gaps_watched(states),
+        is_closed=march.closed(states),
         n_moving=int(np.flatnonzero(is_moving).max(initial=-1)) + 1,
         tables=followed,
         unit_length=unit_length,

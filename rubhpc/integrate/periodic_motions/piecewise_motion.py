@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.integrate.marches.closed_form import closed_form_march
-from rubhpc.integrate.marches.friction import FrictionMarch
+from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.periodic_motions.piece_mode import Mode, know, mode_of, unknown_modes
 from rubhpc.integrate.periodic_motions.revolution import (
@@ -22,10 +21,7 @@ from rubhpc.integrate.periodic_motions.revolution import (
 from rubhpc.integrate.periodic_motions.saltation import carried, monodromy
 from rubhpc.integrate.periodic_motions.tolerances import TO_ROUNDING
 from rubhpc.kernels.flow import Timing, piece_room
-from rubhpc.kernels.friction_states import STUCK, state_of
 from rubhpc.kernels.revolutions import (
-    AFTER,
-    AT_EVENT,
     BEYOND,
     FOLLOWED,
     FULL,
@@ -33,8 +29,6 @@ from rubhpc.kernels.revolutions import (
     PIECE,
     STATES,
     UNSOLVED,
-    Passage,
-    PieceRows,
     begin_passage,
     follow_revolutions,
     new_passage,
@@ -45,7 +39,6 @@ from rubhpc.kernels.small_changes import ChangeRoom, change_room
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rubhpc.integrate.marches.event_driven import EventDrivenMarch
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.record import State
 
@@ -69,7 +62,7 @@ class PiecewiseMotion:
     Attributes
     ----------
     start, states : (2 n,)
-        Where the case begins: its reduced motion, and the states of its pairs.
+        Where the case begins: its reduced motion, and its closed pairs.
     turn : float, s
         Duration of a revolution.
     energy : (2 n,)
@@ -97,11 +90,9 @@ class PiecewiseMotion:
         march: EventDrivenMarch | None = None,
     ) -> None:
         """Take a case in closed form; `NoClosedForm` where it has none."""
-        made = closed_form_march(setup)
-        self.has_states = issubclass(made, FrictionMarch)
         if march is None:
             assert initial is not None
-            march = made(setup, clearance, friction, initial, None)
+            march = EventDrivenMarch(setup, clearance, friction, initial, None)
         elif initial is not None:
             march.start_again(initial)
         self.march = march
@@ -111,11 +102,10 @@ class PiecewiseMotion:
         self.n, self.q = self.bodies.stiffness.shape[0], len(setup.model.stators)
         self.energy = np.ones(2 * self.n)
         self.energy[: self.n] = setup.spin**2
-        self.n_switch = self.march.tables.switch_re.shape[1]
         self._modes: dict[int, Mode] = {}
         self._change_rooms: dict[tuple[int, int], ChangeRoom] = {}
         self._take_tables()
-        self._rows = piece_rows(FEW_PIECES, 2 * self.n, self.n_switch, self.q)
+        self._rows = piece_rows(FEW_PIECES, 2 * self.n, self.q)
         self._passage = new_passage(2 * self.n)
         self._asked: tuple[int, int, float, float] | None = None
         clock = self.march.clock
@@ -208,8 +198,6 @@ class PiecewiseMotion:
                 self.mode(int(passage.reached[STATES]))
             elif outcome == FULL:
                 self._rows = longer(self._rows)
-            elif outcome == AT_EVENT:
-                self.take_event(self._rows, passage)
             else:
                 raise Unfollowed(self.why_unfollowed(outcome, most_events))
             outcome = follow_revolutions(
@@ -217,7 +205,6 @@ class PiecewiseMotion:
                 self.bodies,
                 self.room,
                 timing,
-                not self.has_states,
                 passage,
                 self._rows,
                 least,
@@ -250,17 +237,6 @@ class PiecewiseMotion:
             return "no contact forces that obey the laws were found"
         return f"more than {most_events} events in a revolution"
 
-    def take_event(self, rows: PieceRows, passage: Passage) -> None:
-        """Take the event that ends the last piece, which `follow_revolutions` has left."""
-        reached, motion = passage.reached, passage.motion
-        k, angle = int(reached[PIECE]) - 1, self.setup.spin * passage.passed[0]
-        states, crossing = rows.states[k, :2].tolist()
-        after = self.march.change(states, crossing, angle, motion)
-        if after < 0:
-            raise Unfollowed(self.why_unfollowed(UNSOLVED, 0))
-        rows.motions[k, AFTER], rows.given[k] = motion, self.march.given
-        rows.states[k, 3] = reached[STATES] = after
-
     def monodromy(self, revolutions: Sequence[Revolution]) -> Floats:
         """Derivative (2 n, 2 n) of a motion's end by its beginning."""
         return monodromy(self, revolutions)
@@ -292,15 +268,13 @@ class PiecewiseMotion:
                 found.append((i, "touch"))
             if was[i] and not is_closed[i]:
                 found.append((i, "release"))
-            elif self.has_states and was[i] and state_of(piece.states, i) != state_of(piece.states_after, i):
-                found.append((i, "stick" if state_of(piece.states_after, i) == STUCK else "slip"))
         return found
 
     def _take_tables(self) -> None:
         self._modes.clear()
         self._tables = self.march.tables
         width = self._tables.switch_re.shape[2]
-        self.room = piece_room(self.n_switch, width)
+        self.room = piece_room(self.q, width)
         self.known = unknown_modes(self._tables)
         if len(self.march.derived) <= FEW_MODES:  # kernels would ask for them one by one
             for states in sorted(self.march.derived.keys() & set(self._tables.mask.tolist())):

@@ -27,11 +27,11 @@ class Piece(NamedTuple):
     Attributes
     ----------
     states : int
-        Set of closed pairs, or of the states of all pairs under set-valued friction.
+        Set of closed pairs.
     begin, duration : float, s
         Since the shaft passed its angle 0, and until the event or the end of the revolution.
     crossing : int
-        Bits of the switch functions that vanish at the end; 0 where the revolution ends.
+        Pairs whose switch functions vanish at the end; 0 where the revolution ends.
     before, after : (2 n,)
         Reduced displacements and velocities at the end, before and after the event.
     touching, approach : (k,)
@@ -74,25 +74,24 @@ class Revolution:
 
     @property
     def states(self) -> int:
-        """States of the pairs at the end."""
+        """Set of closed pairs at the end."""
         return int(self.rows.states[-1, 3])
 
     @cached_property
     def pieces(self) -> list[Piece]:
         """Its pieces."""
-        stride = self.rows.rates.shape[1] // self.least_gap.size
         rows = self.rows
         columns = rows.states.tolist(), rows.times.tolist(), rows.motions, rows.rates
-        return [_piece(stride, *row) for row in zip(*columns, strict=True)]
+        return [_piece(*row) for row in zip(*columns, strict=True)]
 
 
-def _piece(stride: int, states: list[int], times: list[float], motions: Floats, rates: Floats) -> Piece:
-    """Return the piece of a row; a pair has its switch functions `stride` apart."""
+def _piece(states: list[int], times: list[float], motions: Floats, rates: Floats) -> Piece:
+    """Return the piece of a row."""
     before, crossing, gaps, after = states
     touching, approach = NO_PAIR, NO_SPEED
     if gaps:
-        touching = np.array([i for i in range(rates.size // stride) if gaps >> stride * i & 1])
-        approach = -rates[stride * touching]
+        touching = np.array([i for i in range(rates.size) if gaps >> i & 1])
+        approach = -rates[touching]
     return Piece(
         states=before,
         begin=times[0],
@@ -150,8 +149,8 @@ def copied(rows: PieceRows, k: int) -> PieceRows:
 
 def longer(rows: PieceRows) -> PieceRows:
     """Return these rows, and room for as many again."""
-    k, _, q = rows.given.shape
-    found = piece_rows(2 * k, rows.motions.shape[2], rows.rates.shape[1], q)
+    k, q = rows.given.shape
+    found = piece_rows(2 * k, rows.motions.shape[2], q)
     for part, old in zip(found, rows, strict=True):
         part[:k] = old
     return found

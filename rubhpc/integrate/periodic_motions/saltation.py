@@ -28,7 +28,6 @@ class Followed(Protocol):
     n: int
     bodies: Reduced
     known: PieceModes
-    has_states: bool
 
     def mode(self, states: int) -> Mode:
         """Contact mode with these states."""
@@ -74,7 +73,6 @@ def _carry(motion: Followed, rows: PieceRows, columns: Floats, kept: Floats) -> 
         piece = carry_pieces(
             motion.known,
             motion.bodies,
-            motion.has_states,
             rows,
             piece,
             len(rows.times),

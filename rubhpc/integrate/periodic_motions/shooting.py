@@ -19,7 +19,6 @@ from rubhpc.integrate.periodic_motions.piecewise_motion import (
 from rubhpc.integrate.periodic_motions.revolution import copied, longer, whole_revolutions
 from rubhpc.integrate.periodic_motions.shooting_by_revolutions import Search
 from rubhpc.kernels.revolutions import (
-    AT_EVENT,
     FULL,
     MODE_UNKNOWN,
     STATES,
@@ -228,7 +227,7 @@ class _Shot:
         begin_passage(self._passage, motion, states, timing.begin)
         self._least = np.full((period, 2, piecewise.q), np.inf)
         k = FEW_PIECES * period
-        self._rows = [piece_rows(k, motion.size, piecewise.n_switch, piecewise.q) for _ in range(2)]
+        self._rows = [piece_rows(k, motion.size, piecewise.q) for _ in range(2)]
         search.tried[:] = motion
         search.now[TRIED] = states
 
@@ -249,8 +248,6 @@ class _Shot:
                     self._piecewise.mode(self._wanted())
                 elif outcome == FULL:
                     self._rows[under_way] = longer(self._rows[under_way])
-                elif outcome == AT_EVENT:
-                    self._piecewise.take_event(self._rows[under_way], self._passage)
                 elif outcome == SINGULAR:  # at a fold
                     matrix = np.eye(len(self.search.step)) - self.search.columns
                     self.search.step[:] = np.linalg.lstsq(matrix, self.search.defect, rcond=1e-12)[0]
@@ -292,7 +289,6 @@ class _Shot:
             piecewise.bodies,
             piecewise.room,
             self._timing,
-            piecewise.has_states,
             self.search,
             piecewise.change_room(self.search.step.size),
             self._passage,

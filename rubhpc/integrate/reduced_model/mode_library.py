@@ -8,13 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rubhpc.integrate.reduced_model.contact_mode import (
-    ContactMode,
-    SlidingPairs,
-    count_coordinates,
-    stored_energy,
-)
-from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs
+from rubhpc.integrate.reduced_model.contact_mode import ContactMode, SlidingPairs, count_coordinates
 from rubhpc.integrate.reduced_model.mode_tables import bytes_ahead, energies_of, mode_of, tabulate
 from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions
 from rubhpc.integrate.reduced_model.table_stack import MOST_BYTES, MOST_MODES, TableStack
@@ -45,9 +39,6 @@ class ModeLibrary:
 
     Parameters
     ----------
-    pairs : SlidingPairs or FrictionPairs, optional
-        By default those of steady sliding, whose gaps are constraints while closed. Masks have a bit for each
-        pair, under a penalty a further one for lifted pairs; with stick there are two bits for each state.
     opened : ContactMode
         The mode with every pair open, which does not depend on friction.
     known : Solved
@@ -68,7 +59,6 @@ class ModeLibrary:
         model: Model,
         friction: float,
         *,
-        pairs: SlidingPairs | FrictionPairs | None = None,
         opened: ContactMode,
         known: Solved,
         tick: float,
@@ -79,7 +69,7 @@ class ModeLibrary:
     ) -> None:
         """Start with every pair open; of one pair also with it closed."""
         self.reduced = reduced
-        self._take_pairs(model, friction, pairs)
+        self._take_pairs(model, friction)
         self._tick, self._sample_level = tick, sample_level
         self._n_level = self._n_level_followed = n_level
         self._is_measured = is_measured
@@ -88,7 +78,7 @@ class ModeLibrary:
         self._among = open_bodies(reduced, model, opened) if among is None else among
         self.first_masks = [0] if q > 1 else [0, 1]
         modes = [self._solved(mask) for mask in self.first_masks]
-        self.width = self._width([mode.exponent.size for mode in modes])
+        self.width = padded_width(max(mode.exponent.size for mode in modes), q)
         may_be_large, ahead = self._is_measured and self._is_parted, (self._n_ahead, n_level)
         if may_be_large and q > FEW_PAIRS:
             self._n_ahead, self._n_level = 1, sample_level + 1
@@ -100,7 +90,7 @@ class ModeLibrary:
             rows = [self._tables_of(mode, reduced) for mode in modes]
         self._tables = TableStack(1 + q, self._most_modes, MOST_BYTES)
         self.masks = [mode.mask for mode in modes]
-        self._exponents: dict[int, tuple[Floats, Floats]] = {}
+        self._exponents: dict[int, Floats] = {}
         self.derived: dict[int, Any] = {}  # derived data of the modes, by mask
         self._chance = np.random.default_rng(0)
         for mode, row in zip(modes, rows, strict=True):
@@ -177,7 +167,7 @@ class ModeLibrary:
         if mask not in self.masks:
             return None
         row = self._tables.row(self.masks.index(mask))
-        return mode_of(row, type(self._opened), self._exponents[mask])
+        return mode_of(row, self._exponents[mask])
 
     def make_room(self) -> None:
         """Discard a contact mode other than the initial ones.
@@ -214,8 +204,8 @@ class ModeLibrary:
         tables: kernel.ModeTables = self._tables.view()
         return tables
 
-    def exponents(self, mask: int) -> tuple[Floats, Floats]:
-        """Exponents of a mode's coordinates, 1/s: (2, m), real and imaginary; drift (m,) of those at 0."""
+    def exponents(self, mask: int) -> Floats:
+        """Exponents of a mode's coordinates, 1/s: (2, m), real and imaginary."""
         return self._exponents[mask]
 
     is_tuned_ahead = False  # whether modes are tuned to several pieces of a changing speed together
@@ -229,42 +219,24 @@ class ModeLibrary:
     _most_modes = MOST_MODES
     _is_measured = True
 
-    def _take_pairs(self, model: Model, friction: float, pairs: SlidingPairs | FrictionPairs | None) -> None:
+    def _take_pairs(self, model: Model, friction: float) -> None:
         self.gap_jacobian, self.force_direction, self.slip = directions(self.reduced, model, friction)
-        self._pairs = pairs or SlidingPairs(self.gap_jacobian, self.force_direction)
-        if isinstance(pairs, FrictionPairs):  # whose switch functions contain the slip
-            self.slip = self.slip[:0]
-
-    def _width(self, sizes: list[int]) -> int:
-        """Width of tables for modes of these sizes and any set that is met later."""
-        has_stick = isinstance(self._pairs, FrictionPairs)
-        return padded_width(max(sizes), len(self.gap_jacobian), has_stick=has_stick)
+        self._pairs = SlidingPairs(self.gap_jacobian, self.force_direction)
 
     def _solved(self, mask: int) -> ContactMode:
         return self._opened if mask == 0 else self._solve(mask)
 
     def _solve(self, mask: int) -> ContactMode:
-        """The mode of a set of states."""
-        opened = self._opened if mask else None
-        return mode_among(self._among, self.reduced, self._pairs, opened, mask, self._known)
+        """The mode of a set of closed pairs."""
+        return mode_among(self._among, self.reduced, self._pairs, mask, self._known)
 
     def _energies_of(self, mode: ContactMode) -> Energies:
         """Energies of a mode."""
-        friction, reduced = self._friction_of(mode), self._pairs.damped(self.reduced, mode.mask)
+        friction = self._friction_of(mode)
         if self._among is None:
-            found = energies_of(mode, reduced, friction, self.width)
-        else:
-            closed = self._pairs.closed(mode.mask)
-            found = self._among.energies(mode, reduced, friction, closed, self.width)
-        return self._with_springs(found, mode)
-
-    def _with_springs(self, energies: Energies, mode: ContactMode) -> Energies:
-        """Energies of a mode with those of the springs of a law."""
-        stiffness, pressed = self._pairs.stiffness, self._pairs.closed(mode.mask)
-        if not (stiffness and pressed):
-            return energies
-        stored = stored_energy(stiffness, self.gap_jacobian, pressed, mode, self.width)
-        return energies._replace(loss=energies.loss + stored)
+            return energies_of(mode, self.reduced, friction, self.width)
+        closed = self._pairs.closed(mode.mask)
+        return self._among.energies(mode, self.reduced, friction, closed, self.width)
 
     def _friction_of(self, mode: ContactMode) -> Complexes | None:
         """Friction forces on the motion with each coordinate of a mode (n, m), N; None: omitted."""
@@ -276,9 +248,9 @@ class ModeLibrary:
         self._tables.add(row or self._tables_of(mode, self.reduced))
 
     def _note_exponents(self, mode: ContactMode) -> None:
-        exponent, drift, m = np.zeros((2, self.width)), np.zeros(self.width), mode.exponent.size
-        exponent[0, :m], exponent[1, :m], drift[:m] = mode.exponent.real, mode.exponent.imag, mode.drift
-        self._exponents[mode.mask] = exponent, drift
+        exponent, m = np.zeros((2, self.width)), mode.exponent.size
+        exponent[0, :m], exponent[1, :m] = mode.exponent.real, mode.exponent.imag
+        self._exponents[mode.mask] = exponent
 
     def _tables_of(self, mode: ContactMode, reduced: ReducedModel) -> kernel.ModeTables:
         """Tables of one mode."""
@@ -296,12 +268,12 @@ class ModeLibrary:
         )
 
 
-def padded_width(widest: int, q: int, *, has_stick: bool = False) -> int:
+def padded_width(widest: int, q: int) -> int:
     """Width of tables for modes of q pairs up to this size; for several pairs the size of the open mode.
 
     Closing a gap removes a degree of freedom. It adds a coordinate only where a vibration becomes two decays.
     """
-    return -(-(widest + (SPARE if q > 1 or has_stick else 0)) // LANES) * LANES
+    return -(-(widest + (SPARE if q > 1 else 0)) // LANES) * LANES
 
 
 def width_without_modes(reduced: ReducedModel, model: Model, friction: float, n_open: int) -> int:

@@ -9,13 +9,12 @@ from numpy.typing import NDArray
 
 from rubhpc.errors import InputError
 from rubhpc.fem.model import FAR_APART
-from rubhpc.integrate.reduced_model.friction_mode import FrictionMode
+from rubhpc.integrate.reduced_model.contact_mode import ContactMode
 from rubhpc.kernels import contact_modes as kernel
 from rubhpc.kernels.contact_modes import LANES
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL
 
 if TYPE_CHECKING:
-    from rubhpc.integrate.reduced_model.contact_mode import ContactMode
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
 
     Ints = NDArray[np.int64]
@@ -27,19 +26,6 @@ STEADY = 1e-13  # sum of two exponents over the greatest; less counts as zero
 
 GONE = -40.0  # exponent of a decayed coordinate
 _MOST_GROWTH = 700.0  # exponent of a growing one over the longest step: beyond, its exponential is no float
-
-
-class Growth(NamedTuple):
-    """Coordinates that grow linearly, in a mode in which pairs stick."""
-
-    which: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
-    speed: NDArray[np.float64] = np.zeros(0)  # 1/s times their unit
-    steady: int = -1  # the coordinate that is 1
-
-    def among(self, columns: NDArray[np.int64]) -> Growth:
-        """The same with places counted among some of the coordinates, in ascending order."""
-        which, steady = np.searchsorted(columns, self.which), int(np.searchsorted(columns, self.steady))
-        return Growth(which, self.speed, steady)
 
 
 class Energies(NamedTuple):
@@ -81,15 +67,7 @@ def energies_of(mode: ContactMode, reduced: ReducedModel, friction: Complexes | 
     rubbing = np.zeros((len(motion) // 2, width), dtype=complex)
     if friction is not None:
         rubbing[:, : mode.exponent.size] = friction
-    return energy_forms(reduced, exponent, motion, rubbing, mode.n_eigenmode, growth_of(mode))
-
-
-def growth_of(mode: ContactMode) -> Growth:
-    """The coordinates of a mode that grow linearly."""
-    if not isinstance(mode, FrictionMode):
-        return Growth()
-    which = np.flatnonzero(mode.growth)
-    return Growth(which, mode.growth[which], mode.n_eigenmode + 1 + len(mode.switch) // 2)
+    return energy_forms(reduced, exponent, motion, rubbing, mode.n_eigenmode)
 
 
 def energy_forms(
@@ -98,7 +76,6 @@ def energy_forms(
     motion: Complexes,
     friction: Complexes,
     n_eigenmode: int,
-    growing: Growth,
 ) -> Energies:
     """Primitives of the powers of damping and unbalance.
 
@@ -114,7 +91,7 @@ def energy_forms(
     phasor = reduced.force[0] - 1j * reduced.force[1]
     turning = np.full(exponent.shape, 1j * reduced.spin)
     powers = rate.T @ resisting, rate.T @ resisting.conj()
-    loss = product_form(*powers, exponent, n_eigenmode, growing)
+    loss = product_form(*powers, exponent)
     work = 0.5 * np.stack(
         [
             _primitive(phasor @ rate, exponent + turning),
@@ -125,24 +102,18 @@ def energy_forms(
     if exponent.size > n_eigenmode:
         response = rate[:, n_eigenmode]
         steady[:] = response @ resisting[:, n_eigenmode].conj(), response @ phasor.conj()
-    if growing.which.size:
-        steady[0] += 2.0 * rate[:, growing.steady] @ resisting[:, growing.steady]
     return Energies(loss, work, 0.5 * steady.real)
 
 
-def product_form(
-    power: Complexes, with_conjugate: Complexes, exponent: Complexes, n_eigenmode: int, growing: Growth
-) -> Floats:
+def product_form(power: Complexes, with_conjugate: Complexes, exponent: Complexes) -> Floats:
     """Symmetric form (2 m, 2 m) of real and imaginary parts whose growth is the integral of a product.
 
     With rows a and b (r, m) it is the product of `Re(a z)` and `Re(b z)`, summed over r. `power` is `a' b`,
-    `with_conjugate` is `a' conj(b)`; coordinates that grow linearly are among those of b alone.
+    `with_conjugate` is `a' conj(b)`.
     """
     forms = []
     for product, other in ((power, exponent), (with_conjugate, exponent.conj())):
         form = _primitive(product, exponent[:, None] + other)
-        if growing.which.size:
-            _follow_growth(form, product, exponent, n_eigenmode, growing)
         forms.append(form)
     itself, conjugate = forms
     whole = 0.5 * np.block(
@@ -152,23 +123,6 @@ def product_form(
         ]
     )
     return 0.5 * (whole + whole.T)
-
-
-def _follow_growth(
-    form: Complexes, power: Complexes, exponent: Complexes, n_eigenmode: int, growing: Growth
-) -> None:
-    """Correct primitives for coordinates that grow: `int z phi = z phi / l - phi' z / l^2`.
-
-    Primitives of products with the coordinate that is 1: phi / phi' for a clearance, phi^2 / (2 phi') for
-    phi. Its product with itself is part of the steady power.
-    """
-    moving, one = slice(n_eigenmode + 1), growing.steady
-    for phi, speed in zip(growing.which, growing.speed, strict=True):
-        form[moving, one] -= speed * power[moving, phi] / exponent[moving] ** 2
-        form[phi, phi] += 0.5 * power[one, phi] / speed
-    first, speed = growing.which[0], growing.speed[0]
-    clearances = slice(n_eigenmode + 1, one)
-    form[first, clearances] += power[one, clearances] / speed
 
 
 def _primitive(power: Complexes, exponent: Complexes) -> Complexes:
@@ -195,7 +149,7 @@ def tabulate(
     Parameters
     ----------
     slip : (q, n)
-        Slip speed of each pair with the motion; empty where the switch functions contain it.
+        Slip speed of each pair with the motion.
     energies : Energies, optional
         Of coordinates padded to `width`; None where nothing is measured.
     tick : float, s
@@ -222,15 +176,8 @@ def tabulate(
         raise InputError(f"rig: {FAR_APART}")
     growth = np.exp(np.maximum(exponent.real, 0.0) * bounded_over)
     power = np.exp(exponent * steps[:, None]) * used
-    is_fast = (exponent.imag == 0.0) & (exponent.real * tick * 2.0**sample_level < -1.0)
     rate = switch * exponent
     sliding = (slip if is_measured else slip[:0]) @ motion[n:]
-    bend = primitive = np.zeros((0, m), dtype=complex)
-    if isinstance(mode, FrictionMode):
-        bend, growing = switch * exponent**2, growth_of(mode)
-        moves = np.abs(exponent) > kernel.STILL
-        primitive = np.where(moves, switch / np.where(moves, exponent, 1.0), 0.0)
-        rate[:, growing.steady] += switch[:, growing.which] @ growing.speed
     output = np.zeros((2 * m, 0))
     if is_measured:
         interval = tick * 2.0**sample_level
@@ -245,11 +192,6 @@ def tabulate(
         rate_re=rate.real,
         rate_im=rate.imag,
         bound=np.abs(switch) * np.abs(exponent) ** 2 * growth,
-        bend_re=bend.real,
-        bend_im=bend.imag,
-        turn=np.abs(bend) * np.abs(exponent) * np.where(is_fast, -1.0, growth),
-        primitive_re=primitive.real,
-        primitive_im=primitive.imag,
         pace=np.where(exponent.real * tick * 2**kernel.FORCED_LEVEL < GONE, kernel.DYING, np.abs(exponent)),
         power_re=power.real,
         power_im=power.imag,
@@ -284,27 +226,21 @@ def bytes_ahead(tables: kernel.ModeTables, reduced: ReducedModel, n_ahead: int, 
     return int(sum(field.nbytes for field in tables) + 2 * m * (columns + levels) * tables.pace.itemsize)
 
 
-def mode_of(row: kernel.ModeTables, kind: type[ContactMode], exponents: tuple[Floats, Floats]) -> ContactMode:
+def mode_of(row: kernel.ModeTables, exponents: Floats) -> ContactMode:
     """Return the contact mode that tables (1, ...) and exponents (`mode_library.ModeLibrary.exponents`) hold.
 
-    `kind` is ContactMode or FrictionMode. The result equals the tabulated mode bit for bit.
+    The result equals the tabulated mode bit for bit.
     """
-    (parts, drift), m, q = exponents, int(row.n_eigenmode[0]), row.enter_constant.shape[1]
-    rest: dict[str, Any] = {}
-    if issubclass(kind, FrictionMode):  # the last row is of the coordinate that is 1
-        end = n_filled = m + 2 * q
-        rest = {"n_mode": m, "growth": drift[:end]}
-    else:
-        end, n_filled = m + 1 + q, m
+    m, q = int(row.n_eigenmode[0]), row.enter_constant.shape[1]
+    end = m + 1 + q
     halves = np.concatenate([row.enter_cosine, row.enter_sine, row.enter_constant[0]])  # (2 + q, 2, m)
-    return kind(
+    return ContactMode(
         mask=int(row.mask[0]),
-        exponent=_joined(parts[0, :end], parts[1, :end]),
+        exponent=_joined(exponents[0, :end], exponents[1, :end]),
         motion=_joined(row.motion_re[0, :, :end], row.motion_im[0, :, :end]),
-        enter=_joined(row.enter_re[0, :, :n_filled], row.enter_im[0, :, :n_filled]).T,
-        take_off=_joined(halves[:, 0, :n_filled], halves[:, 1, :n_filled]),
+        enter=_joined(row.enter_re[0, :, :m], row.enter_im[0, :, :m]).T,
+        take_off=_joined(halves[:, 0, :m], halves[:, 1, :m]),
         switch=_joined(row.switch_re[0, :, :end], row.switch_im[0, :, :end]),
-        **rest,
     )
 
 

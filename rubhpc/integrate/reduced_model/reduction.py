@@ -289,8 +289,6 @@ def kernel_bodies(
         rim_speed=radius * abs(reduced.spin),
         slip=slip,
         restitution=law.restitution,
-        spring=law.stiffness,
-        damper=law.damping,
         clearance=clearance,
         translations=reduced.translations,
         displacement_limit=displacement_limit,

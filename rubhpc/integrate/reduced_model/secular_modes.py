@@ -30,12 +30,10 @@ MOST = 64  # sets whose eigenmodes are kept
 
 
 class Contact(NamedTuple):
-    """A closed pair, or a sticking slip."""
+    """A closed pair, whose gap is a constraint."""
 
-    row: Floats  # (n,), constrained or pressed quantity, by displacements
+    row: Floats  # (n,), gap by displacements
     force: Floats  # (n,), of a unit contact force
-    stiffness: float = 0.0  # N/m; with neither stiffness nor damping, `row` is a constraint
-    damping: float = 0.0  # N s/m
 
 
 class Eigenmodes(NamedTuple):
@@ -50,26 +48,22 @@ def with_contact(modes: Eigenmodes, contact: Contact) -> Eigenmodes | None:
     """Eigenmodes with one more contact; None where the method fails.
 
     With `A` the system without it, `b` the input of its force and `c` its row, the force is that of a
-    constraint `c x = 0`, or `-(k + d s) c x`. Exponents are then the zeros of
+    constraint `c x = 0`. Exponents are then the zeros of
 
-        a + sum over j of r_j / (s - l_j),    r_j = (k + d l_j) c_j b_j,   a = 1,
+        sum over j of r_j / (s - l_j),    r_j = c_j b_j,
 
-    over all exponents `l_j` of A, b and c by its eigenmodes; of a constraint a = 0 and `r_j = c_j b_j`, and
-    two zeros are infinite. At a zero s the shape is `inv(s - A) b` and the inverse `c inv(s - A)`. Zeros are
-    represented as distances to an exponent, which makes both as accurate as the eigenmodes of A (Gu and
-    Eisenstat, SIAM J. Matrix Anal. Appl. 15 (1994) 1266-1276). Converged, distinct zeros in the expected
-    number are complete.
+    over all exponents `l_j` of A, b and c by its eigenmodes; two zeros are infinite. At a zero s the shape is
+    `inv(s - A) b` and the inverse `c inv(s - A)`. Zeros are represented as distances to an exponent, which
+    makes both as accurate as the eigenmodes of A (Gu and Eisenstat, SIAM J. Matrix Anal. Appl. 15 (1994)
+    1266-1276). Converged, distinct zeros in the expected number are complete.
     """
     n = len(contact.row)
-    is_held = contact.stiffness == 0.0 and contact.damping == 0.0
     half = np.where(modes.exponent.imag == 0.0, 1.0, 0.5)
     seen = _without_rounding(contact.row, modes.shape.T) * half
     moved = _without_rounding(contact.force, modes.inverse[:, n:])
-    if not is_held:
-        seen = seen * (contact.stiffness + contact.damping * modes.exponent)
     is_active = (seen != 0.0) | (moved != 0.0)
     active, rest = np.flatnonzero(is_active), np.flatnonzero(~is_active)
-    poles = _Poles.of(modes.exponent[active], seen[active], moved[active], is_held)
+    poles = _Poles.of(modes.exponent[active], seen[active], moved[active])
     zeros = poles.zeros() if poles else None
     if poles is None or zeros is None:
         return None
@@ -125,12 +119,11 @@ class _Poles(NamedTuple):
     seen: Complexes  # (p,), c_j
     moved: Complexes  # (p,), b_j
     residue: Complexes  # (p,), r_j
-    constant: float  # a
     apart: Complexes  # (k, p), differences; infinite for itself and coinciding poles
     nearest: Floats  # (k,), least distance to another pole
 
     @classmethod
-    def of(cls, upper: Complexes, seen: Complexes, moved: Complexes, is_held: bool) -> _Poles | None:
+    def of(cls, upper: Complexes, seen: Complexes, moved: Complexes) -> _Poles | None:
         """None where poles coincide and are coupled."""
         turned = np.flatnonzero(upper.imag != 0.0)
         every, every_seen, every_moved = (
@@ -152,7 +145,6 @@ class _Poles(NamedTuple):
             every_seen,
             every_moved,
             every_seen * every_moved,
-            0.0 if is_held else 1.0,
             apart,
             np.sqrt(square.min(axis=1, initial=np.inf)),
         )
@@ -161,7 +153,7 @@ class _Poles(NamedTuple):
         """All zeros by Newton's method; None where it does not converge to as many."""
         n_pole = self.upper.size
         with np.errstate(divide="ignore", invalid="ignore"):  # not finite: strong
-            first = -self.residue[:n_pole] / (self.constant + (1.0 / self.apart) @ self.residue)
+            first = -self.residue[:n_pole] / ((1.0 / self.apart) @ self.residue)
         weak = np.abs(first) <= WEAK * self.nearest
         strong = np.flatnonzero(~weak)
         started = self._start(strong)
@@ -177,7 +169,7 @@ class _Poles(NamedTuple):
         left = moving
         for _ in range(PASSES):
             inverse = 1.0 / (self.apart[own[left]] + distance[left, None])
-            value, slope = self.constant + inverse @ self.residue, -(inverse * inverse) @ self.residue
+            value, slope = inverse @ self.residue, -(inverse * inverse) @ self.residue
             at_zero = distance[left] * value + residue[left]
             rate = value + distance[left] * slope
             shared = left >= own.size - started.size
@@ -219,8 +211,8 @@ class _Poles(NamedTuple):
         others = np.ones(self.every.size, dtype=bool)
         others[chosen] = False
         still = self.residue / self.every
-        constant = self.constant - still[others].sum().real
-        n_zero = chosen.size - (2 if self.constant == 0.0 else 0)
+        constant = -still[others].sum().real
+        n_zero = chosen.size - 2
         if n_zero < 0 or np.abs(constant) <= CONVERGED * np.abs(still).sum():
             return None
         found = np.linalg.eigvals(np.diag(self.every[chosen]) - self.residue[chosen] / constant)
@@ -235,13 +227,13 @@ class _Poles(NamedTuple):
         """Zeros of the function with these poles alone, and one at zero so that residues sum to zero."""
         pole, residue = self.every[chosen], self.residue[chosen]
         weight = residue * pole
-        coupling = residue / self.constant if self.constant else np.outer(pole, weight / weight.sum())
+        coupling = np.outer(pole, weight / weight.sum())
         return np.asarray(np.linalg.eigvals(np.diag(pole) - coupling), dtype=np.complex128)
 
     def shapes(self, zeros: _Zeros) -> tuple[Complexes, Complexes] | None:
         """Shapes and inverses in terms of those of the poles, (z, p) each; None where nearly orthogonal."""
         inverse = 1.0 / (self.apart[zeros.own] + zeros.distance[:, None])
-        value = self.constant + inverse @ self.residue
+        value = inverse @ self.residue
         right = (-self.seen[zeros.own] / value)[:, None] * self.moved * inverse
         left = (-self.moved[zeros.own] / value)[:, None] * self.seen * inverse
         at = np.arange(zeros.own.size), zeros.own
@@ -344,8 +336,7 @@ class Within(NamedTuple):
 
 def _name_of(contact: Contact) -> bytes:
     """Key of a contact."""
-    springs = np.array([contact.stiffness, contact.damping])
-    return contact.row.tobytes() + contact.force.tobytes() + springs.tobytes()
+    return contact.row.tobytes() + contact.force.tobytes()
 
 
 def _states(rows: Ints, n: int) -> Ints:

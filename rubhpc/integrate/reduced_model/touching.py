@@ -10,28 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.integrate.reduced_model import reduction
-from rubhpc.integrate.reduced_model.contact_mode import (
-    pressed_mode,
-    solve_contact_mode,
-    solve_penalty_mode,
-    watched,
-)
+from rubhpc.integrate.reduced_model.contact_mode import solve_contact_mode
 from rubhpc.integrate.reduced_model.coupling import coupled_rows
-from rubhpc.integrate.reduced_model.friction_mode import (
-    FrictionMode,
-    FrictionPairs,
-    mask_of,
-    solve_friction_mode,
-    states_of,
-    watch_open_pairs,
-)
-from rubhpc.integrate.reduced_model.mode_tables import (
-    Energies,
-    Growth,
-    energies_of,
-    energy_forms,
-    growth_of,
-)
+from rubhpc.integrate.reduced_model.mode_tables import Energies, energies_of, energy_forms
 from rubhpc.integrate.reduced_model.products import real_times
 from rubhpc.integrate.reduced_model.secular_modes import Closings, Eigenmodes, Within
 
@@ -91,7 +72,6 @@ class Touching(NamedTuple):
             enter=enter,
             take_off=take_off,
             switch=switch,
-            **own.other_fields(columns, m, end),
         )
 
 
@@ -150,7 +130,7 @@ class OpenBodies:
             return energies_of(mode, reduced, friction, width)
         n, own = len(self._part), mode.n_eigenmode - touching.spared.size
         columns = mode.places(own, mode.n_eigenmode, len(self._seen), touching.pairs).coordinate
-        found, growing = Energies.none(width), growth_of(mode)
+        found = Energies.none(width)
         rubbing = np.zeros((touching.rows.size, columns.size), dtype=np.complex128)
         if friction is not None:
             rubbing += friction[touching.rows[:, None], columns]
@@ -160,7 +140,6 @@ class OpenBodies:
             mode.motion[_states(touching.rows, n)[:, None], columns],
             rubbing,
             own,
-            growing.among(columns),
         )
         found.add(columns, part)
         place = np.full(self.opened.exponent.size, -1)
@@ -205,7 +184,7 @@ class OpenBodies:
             )
             if name not in known:
                 still = np.zeros((rows.size, columns.size), dtype=np.complex128)
-                known[name] = energy_forms(model, exponent, motion, still, n_eigenmode, Growth())
+                known[name] = energy_forms(model, exponent, motion, still, n_eigenmode)
             found.add(columns, known[name])
         return found
 
@@ -213,44 +192,19 @@ class OpenBodies:
 def mode_among(
     among: OpenBodies | None,
     reduced: ReducedModel,
-    pairs: SlidingPairs | FrictionPairs,
-    opened: ContactMode | None,
+    pairs: SlidingPairs,
     mask: int,
     known: Solved | None,
 ) -> ContactMode:
-    """The contact mode of a set of states, solved for the bodies that touch where there are others.
-
-    `opened` is that with every pair open, None where it is the mode asked for.
-    """
+    """The contact mode of a set of closed pairs, solved for the bodies that touch where there are others."""
     closed, (q, n) = pairs.closed(mask), pairs.gap_jacobian.shape
     touching = among.touching(closed) if among and closed else None
     if among is None or touching is None:
         bodies = among.within() if among else None
-        if isinstance(pairs, FrictionPairs):
-            return solve_friction_mode(reduced, pairs, mask, known, bodies)
-        if pairs.stiffness and opened is not None:
-            return solve_penalty_mode(reduced, pairs, opened, mask, known, bodies)
         return solve_contact_mode(reduced, pairs.gap_jacobian, pairs.force_direction, mask, known, bodies)
     model, bodies = touching.model(reduced), among.within(touching.rows)
-    rates = touching.of_pairs(pairs.gap_jacobian)
-    if isinstance(pairs, FrictionPairs):
-        own_friction = replace(
-            pairs,
-            gap_jacobian=rates,
-            friction_direction=touching.of_pairs(pairs.friction_direction),
-            rim_speed=pairs.rim_speed[closed],
-        )
-        states = states_of(mask, q)
-        stuck = solve_friction_mode(model, own_friction, mask_of([states[i] for i in closed]), known, bodies)
-        assert isinstance(among.opened, FrictionMode)
-        found = replace(touching.among_all(stuck, among.opened, n, q), mask=mask)
-        watch_open_pairs(found.switch, found.motion, pairs, mask, found.n_mode)
-        return found
-    own_pairs = pairs._replace(gap_jacobian=rates, force_direction=touching.of_pairs(pairs.force_direction))
-    if pairs.stiffness:
-        own = pressed_mode(model, own_pairs, list(range(len(closed))), known, bodies)
-        return watched(touching.among_all(own, among.opened, n, q), pairs, mask)
-    own = solve_contact_mode(model, rates, own_pairs.force_direction, (1 << len(closed)) - 1, known, bodies)
+    rates, forces = touching.of_pairs(pairs.gap_jacobian), touching.of_pairs(pairs.force_direction)
+    own = solve_contact_mode(model, rates, forces, (1 << len(closed)) - 1, known, bodies)
     mode = replace(touching.among_all(own, among.opened, n, q), mask=mask)
     others = np.setdiff1d(np.arange(q), closed)
     mode.switch[others] = real_times(pairs.gap_jacobian[others], mode.motion[:n])

@@ -27,7 +27,7 @@ MOST_LOOKS = 10_000_000  # in a flight
 GAP_TOLERANCE = 1e-13  # m: what a gap does within it is not looked at
 RECENT = 0.5  # of the last contact: so long a pair that has opened is looked at only now and then
 LEAST_GAP, GAP_BEFORE, RATE_BEFORE = range(3)  # rows of `Solution.turned`
-RARELY = 0.5  # of the time since it has opened
+RARELY = 0.05  # of the time since it has opened
 
 
 @linked_sum

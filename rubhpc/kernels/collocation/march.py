@@ -87,6 +87,7 @@ GROWING = 60.0  # steps are doubled where their error is so much less than the t
 LEAST_SCALE = 1e-3  # N, of forces
 OPENED = 1e-3  # of the last contact: ticks after a release that are not looked at
 MOST_AT_ONCE = 64  # events at one tick, and as many for each pair
+UNDECIDED = 8  # events at one tick for each pair: friction on its bound then goes on for a shortest step
 BRIEF = 512.0  # ticks: a closed pair does not part for less where another one touches
 NO_SLIP = 1e-9  # m/s
 PARTED = 1e-9  # of the rim's speed: gap rate above which a pair has parted in an impact
@@ -591,6 +592,8 @@ def advance_by_collocation(
                         taken = max(taken, 1)  # what opens does not touch at once: such touches have no end
             else:
                 pair = -1
+            if taken == 0 and kind == FRICTION and memory.n_at_once > UNDECIDED * state.size and pair >= 0:
+                taken, pair = whole, -1
             if progress.tick + taken > last_tick:
                 taken, pair = last_tick - progress.tick, -1
             if taken > 0:

@@ -445,8 +445,8 @@ def record_contact(
         for k in range(s):
             part[k] *= t[k]
         worked = step * integral_of(nodes, part, 0.0, share)
-    else:
-        lowest = 0.0
+    if state[i] == STICKING or (state[i] == FORWARD and bodies.is_sticky):  # below zero it is an error
+        lowest = max(0.0, lowest) if state[i] == FORWARD else 0.0
     accumulator.least_slip[i] = min(accumulator.least_slip[i], lowest)
     accumulator.friction_work[i] += worked
     observe_rub(drive, worked, accumulator)
@@ -469,11 +469,13 @@ def record_impulses(
         if n == 0.0 and t == 0.0:
             continue
         rate = 0.5 * (solution.speed[i, NORMAL] + solution.seen[i * s, RATE])
-        slip = 0.5 * (solution.speed[i, FRICTION] + solution.seen[i * s, SLIP])
+        before, after = solution.speed[i, FRICTION], solution.seen[i * s, SLIP]
+        slip = 0.5 * (before + after)
         if i_sample < samples.force.shape[1]:
             samples.force[i, i_sample] += n / interval
         accumulator.impulse[i] += n
         observe_force(i, progress.tick * clock.tick, 0.0, n, 0.0, 0.0, accumulator)
+        accumulator.least_slip[i] = min(accumulator.least_slip[i], before, after)
         accumulator.friction_work[i] += t * slip
         observe_rub(t * bodies.rim_speed[i], t * slip, accumulator)
         accumulator.energy[IMPACT_LOSS] -= n * rate

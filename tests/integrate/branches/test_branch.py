@@ -15,7 +15,6 @@ from rubhpc.integrate.branches.branching import Branching
 from rubhpc.integrate.periodic_motions import family as family_module
 from rubhpc.integrate.periodic_motions.family import MOST_KEPT, Family, Operation
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
-from rubhpc.integrate.reduced_model.truncation import SMOOTH
 from rubhpc.integrate.start import fit_to_gaps
 from rubhpc.study.tables import Integrator
 
@@ -145,9 +144,8 @@ def test_derivative_by_the_clearance_is_that_of_two_flows(along):
     assert found == pytest.approx(expected, abs=1e-6 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("law", [{}, {"friction_law": "coulomb", "law": "penalty", "stiffness": 1e7}])
-def test_cases_along_a_speed_share_a_basis_and_are_followed_as_they_are_recorded(law):
-    family = family_of("speed_ratio", (0.7, 0.8), Contact(**law))
+def test_cases_along_a_speed_share_a_basis_and_are_followed_as_they_are_recorded():
+    family = family_of("speed_ratio", (0.7, 0.8), Contact())
     here, there = family.at(0.75), family.at(0.76)
     motion = np.concatenate([np.full(here.n, 1e-5), np.full(here.n, 1e-3)])
     assert np.array_equal(family.carry(motion, here, there), motion)
@@ -157,27 +155,6 @@ def test_cases_along_a_speed_share_a_basis_and_are_followed_as_they_are_recorded
     ends = [case.revolve(*begun) for case in (here, recorded)]
     assert len(ends[0].pieces) > 1
     assert np.array_equal(ends[0].end, ends[1].end)
-
-
-def test_several_pairs_that_slide_under_coulombs_law_branch_as_pairs_that_slide(monkeypatch):
-    """Both branches go on beyond the grazing of the contact-free motion, with a contact of each stator."""
-    # In the same modes: Coulomb's law keeps more, for the sake of friction that sticks.
-    monkeypatch.setattr("rubhpc.integrate.setup.touch_of", lambda *_, **__: SMOOTH)
-    springs = rubhpc.LumpedStator(node=8, radius=0.06, count=3, mass=1e-3, damping=2.0, stiffness=1e5)
-    ring = replace(read_rig("mokhtar2017"), stator=(springs,))
-    (sliding,), (coulomb,) = (
-        closed_form.branch(
-            ring, along="clearance_ratio", start=1.01, stop=0.998, speed_ratio=0.8, friction=0.1, doublings=0,
-            keep=(), friction_law=law,
-        )
-        for law in ("sliding", "coulomb")
-    )  # fmt: skip
-    assert coulomb.events()[0] == ("grazing", pytest.approx(1.0, rel=1e-8))
-    assert [name for name, _ in coulomb.events()] == [name for name, _ in sliding.events()]
-    assert coulomb.points[-1].touches >= 3
-    values = [[value for _, value in found.events()] for found in (coulomb, sliding)]
-    assert values[0] == pytest.approx(values[1], rel=1e-8)
-    assert coulomb.values[-1] == sliding.values[-1]
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 """Bounces that come to rest while the modes of a rotor follow its speed."""
 
 import numpy as np
-import pytest
 from closed_form import run_up
 
 from rubhpc import LumpedStator, Rig, Unbalance
@@ -12,8 +11,7 @@ STEEL = {"youngs_modulus": 2.1e11, "shear_modulus": 8e10, "density": 7800.0}
 END = {"kyy": 1e7, "kzz": 9e6, "cyy": 1e3, "czz": 1e3}
 
 
-@pytest.mark.parametrize("friction_law", ["sliding", "coulomb"])
-def test_bounces_come_to_rest_at_the_default_accuracy(friction_law):
+def test_bounces_come_to_rest_at_the_default_accuracy():
     """What is lost as a flight enters its mode does not sustain bounces."""
     rotor = Rotor(
         shaft=(ShaftSection(length=0.52, outer_diameter=0.0248, elements=2, **STEEL),),
@@ -44,7 +42,6 @@ def test_bounces_come_to_rest_at_the_default_accuracy(friction_law):
             time=0.11,
             clearance=1.19e-4,
             friction=0.25,
-            friction_law=friction_law,
             restitution=0.54,
             initial={"from": "rest"},
             samples_per_revolution=64,

@@ -5,14 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from calling import called
-from test_filled_modes import LAWS, setup
+from test_filled_modes import MASKS, setup, tables_at
 
 from rubhpc.integrate.changing_speed.mode_courses import NODES
 from rubhpc.integrate.changing_speed.range_library import RangeLibrary, speeds_of
 from rubhpc.kernels.contact_modes import enter, enter_rest
-
-enter = called(enter)
-enter_rest = called(enter_rest)
 
 enter = called(enter)
 enter_rest = called(enter_rest)
@@ -58,19 +55,7 @@ def maps(tables, place):
     }
 
 
-def assert_primitives(tables, row):
-    """Under set-valued friction they are there without energies too: records read impulses from them."""
-    if not tables.bend_re.size:
-        return
-    switch, rate, whole = (
-        getattr(tables, name + "_re")[row] + 1j * getattr(tables, name + "_im")[row]
-        for name in ("switch", "rate", "primitive")
-    )
-    m = int(tables.n_eigenmode[row]) + 1
-    assert whole[:, :m] * rate[:, :m] == pytest.approx(switch[:, :m] ** 2, rel=1e-9)
-
-
-def library_of(base, law, at):
+def library_of(base, at):
     phasor = (base.reduced.force[0] - 1j * base.reduced.force[1]) / base.spin**2
     return RangeLibrary(
         at(0.0),
@@ -82,16 +67,15 @@ def library_of(base, law, at):
         sample_level=base.sample_level,
         n_level=base.n_level,
         reach=REACH,
-        **law.keys(base),
         beside=[at(place) for place in NODES[1:]],
         at_place=at,
         is_balanced=False,
     )
 
 
-def error_at(base, law, at, masks, place):
+def error_at(base, at, masks, place):
     """What modes err by that follow the speed and the acceleration to a place, over the greatest."""
-    library, spin = library_of(base, law, at), base.spin + place * REACH
+    library, spin = library_of(base, at), base.spin + place * REACH
     phasor, factor = library._phasor, complex(spin**2)
     held = base.spin, base.sample_level, REACH
     library.tune(speeds_of([spin], [factor], [0.0], [base.tick], *held), 0)
@@ -105,8 +89,7 @@ def error_at(base, law, at, masks, place):
         assert not library.tables().loss.size
         tables, row = library.tables(), library.masks.index(mask)
         found = maps(tables, row)
-        assert_primitives(tables, row)
-        expected = law.tables(library, reduced, base, mask, levels | {"width": library.width})
+        expected = tables_at(library, reduced, base, mask, levels | {"width": library.width})
         for name, true in maps(expected, 0).items():
             largest = max(np.abs(true).max(initial=0.0), 1e-30)
             worst = max(worst, np.abs(found[name] - true).max(initial=0.0) / largest)
@@ -114,24 +97,22 @@ def error_at(base, law, at, masks, place):
 
 
 @pytest.mark.parametrize("q", [1, 3])
-@pytest.mark.parametrize("law", LAWS, ids=lambda law: type(law).__name__)
-def test_modes_follow_the_speed_in_third_order(q, law):
+def test_modes_follow_the_speed_in_third_order(q):
     base = setup(q)
-    errors = [error_at(base, law, matrices_of(base, size), law.masks[q], -1.0) for size in (20.0, 10.0)]
+    errors = [error_at(base, matrices_of(base, size), MASKS[q], -1.0) for size in (20.0, 10.0)]
     assert errors[0] < 1e-3, errors
     assert errors[1] < 1e-7 or 5.0 < errors[0] / errors[1] < 14.0, errors
 
 
-@pytest.mark.parametrize("law", LAWS, ids=lambda law: type(law).__name__)
-def test_what_entering_a_mode_leaves_of_a_motion_is_entered_too(law):
+def test_what_entering_a_mode_leaves_of_a_motion_is_entered_too():
     base = setup(3)
-    library, spin = library_of(base, law, matrices_of(base, 40.0)), base.spin - REACH
+    library, spin = library_of(base, matrices_of(base, 40.0)), base.spin - REACH
     library.tune(
         speeds_of([spin], [spin**2 + 0j], [0.0], [base.tick], base.spin, base.sample_level, REACH), 0
     )
     n, lost = len(base.reduced.stiffness), 0.0
     size = 1e-4 * np.repeat([1.0, base.spin], n)
-    for mask in law.masks[3]:
+    for mask in MASKS[3]:
         library.add(mask)
         tables, row = library.tables(), library.masks.index(mask)
         rows = [getattr(tables, name)[row] for name in ("motion_re", "motion_im", "enter_re", "enter_im")]

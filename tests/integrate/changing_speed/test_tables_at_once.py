@@ -15,8 +15,7 @@ SIGNALS = "vertical", "torsion", "probe_twist", "probe_impeller"
 
 
 @pytest.mark.parametrize("per_revolution", [None, 16])  # by default blocks have few pieces
-@pytest.mark.parametrize("law", [{}, {"friction_law": "coulomb"}], ids=["sliding", "coulomb"])
-def test_fewer_pieces_at_once_give_the_same_run_up(law, per_revolution, monkeypatch):
+def test_fewer_pieces_at_once_give_the_same_run_up(per_revolution, monkeypatch):
     rig, found, rooms = replace(pump(), stator=TIPS), [], []
     room_of = range_library.RangeLibrary._n_room_of
 
@@ -29,7 +28,7 @@ def test_fewer_pieces_at_once_give_the_same_run_up(law, per_revolution, monkeypa
         monkeypatch.setattr(range_library, "MOST_BYTES", most)
         pieces._KNOWN.clear()  # matrices with tables for as many pieces as before
         speed_ranges._BUFFERS.clear()
-        case = CASE | law | {"pieces_per_revolution": per_revolution}
+        case = CASE | {"pieces_per_revolution": per_revolution}
         found.append(run_up(rig, **case, probes=PROBES, samples_per_revolution=64))
     assert found[0].contact_fraction.max() > 0.0
     assert rooms[0] > min(rooms[1:-1]) > rooms[-1] == 1

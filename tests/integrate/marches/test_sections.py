@@ -6,12 +6,10 @@ from closed_form import Contact, read_rig
 
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import first_lateral_frequency
-from rubhpc.integrate.marches.closed_form import closed_form_march
-from rubhpc.integrate.marches.friction import FrictionMarch
+from rubhpc.integrate.case import MARCHES
 from rubhpc.integrate.setup import prepare
 from rubhpc.integrate.start import at_rest
 from rubhpc.integrate.transient import idle_of, pass_revolutions
-from rubhpc.kernels.case_progress import CONTACT_UNSOLVED
 from rubhpc.study.study import Integrator, Recording
 
 N, CLEARANCE = 12, 84e-6
@@ -28,12 +26,10 @@ def march_of(contact, ratio=0.75, **limits):
     )  # fmt: skip
     for name, value in limits.items():
         object.__setattr__(setup, name, value)
-    return closed_form_march(setup)(setup, CLEARANCE, 0.3, at_rest(setup, CLEARANCE), None)
+    return MARCHES[setup.scheme](setup, CLEARANCE, 0.3, at_rest(setup, CLEARANCE), None)
 
 
-@pytest.mark.parametrize(
-    "contact", [{}, {"law": "penalty", "stiffness": 1e7}, {"friction_law": "coulomb"}], ids=str
-)
+@pytest.mark.parametrize("contact", [{}, {"restitution": 0.5}], ids=str)
 def test_sections_are_those_of_single_revolutions(contact):
     together, singly = march_of(contact), march_of(contact)
     idle = idle_of(singly)
@@ -69,23 +65,3 @@ def test_case_that_diverges_ends_in_the_same_revolution():
     _, reason = together.pass_sections(N, *idle)
     assert reason == expected
     assert together.sample == (n + 1 - N) * RECORDING.samples_per_revolution
-
-
-def test_revolution_by_collocation_stands_among_the_others(monkeypatch):
-    """A case that leaves closed form for a revolution in the first one goes on to the same number of them."""
-    exact, left = march_of({"friction_law": "coulomb"}), march_of({"friction_law": "coulomb"})
-    idle = idle_of(exact)
-    expected, _ = exact.pass_sections(N, *idle)
-    follow, n_call = FrictionMarch._by_kernel, []
-
-    def unsolved_at_first(march, *args, **kwargs):
-        n_call.append(kwargs.keys())
-        return CONTACT_UNSOLVED if len(n_call) == 1 else follow(march, *args, **kwargs)
-
-    monkeypatch.setattr(FrictionMarch, "_by_kernel", unsolved_at_first)
-    sections, reason = left.pass_sections(N, *idle)
-    assert (reason, left.n_left, left.sample) == (None, 1, 0)
-    assert n_call[0] == {"sections"}
-    n = expected.shape[1] // 2
-    apart = np.linalg.norm((sections - expected)[:, :n], axis=1) / np.linalg.norm(expected[:, :n], axis=1)
-    assert 0.0 < apart.max() < 1e-3

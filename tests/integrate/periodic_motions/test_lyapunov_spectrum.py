@@ -11,6 +11,7 @@ from impact_map import RESTITUTION, next_impact
 import rubhpc
 from rubhpc import LumpedStator, Rig, State, Unbalance
 from rubhpc.errors import InputError
+from rubhpc.integrate.periodic_motions.collocated_motion import followed_motion
 from rubhpc.integrate.periodic_motions.lyapunov_spectrum import exponents, kaplan_yorke_dimension
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.setup import prepare
@@ -100,37 +101,35 @@ def test_impacts_alone_shrink_the_volume():
 
 
 @pytest.mark.parametrize(
-    ("contact", "damping"),
+    ("contact", "damping", "allowed"),
     [
-        ({"restitution": RESTITUTION}, 0.02),
-        ({"law": "penalty", "stiffness": 400.0, "damping": 0.0}, 0.0),
-        ({"law": "penalty", "stiffness": 400.0, "damping": 1.5}, 0.02),
+        ({"restitution": RESTITUTION}, 0.02, 1e-7),
+        ({"law": "penalty", "stiffness": 400.0, "damping": 0.0}, 0.0, 1e-3),
+        ({"law": "penalty", "stiffness": 400.0, "damping": 1.5}, 0.02, 1e-3),
     ],
     ids=["restitution", "penalty", "damped penalty"],
 )
-def test_sum_is_the_trace_of_the_flow_between_impacts_and_in_contact(contact, damping):
+def test_sum_is_the_trace_of_the_flow_between_impacts_and_in_contact(contact, damping, allowed):
     """Chaos: dampers act for as long as they are pressed, impacts take a share each, and events nothing."""
     setup = prepare(
         oscillator(damping), SPIN, contact=Contact(**contact), integrator=Integrator(step=1e-3),
         samples_per_revolution=64,
     )  # fmt: skip
     begun = replace(State.at_rest(setup.model), rotor_velocity=np.array([0.3]))
-    motion = PiecewiseMotion(setup, 1e-12, 0.0, begun)
+    motion = followed_motion(setup)(setup, 1e-12, 0.0, begun)
     found = exponents(motion, 2, aligning=0, followed=100)
     at, states, pressed, n_event, logarithm = motion.start, motion.states, 0.0, 0, 0.0
     for _ in range(100):
         revolution = motion.revolve(at, states)
         at, states = revolution.end, revolution.states
-        n_event += sum(piece.crossing != 0 for piece in revolution.pieces)
-        pressed += sum(
-            piece.duration for piece in revolution.pieces if motion.mode(piece.states).is_closed[0]
-        )
+        n_event += len(revolution.pieces) - 1
+        pressed += sum(piece.duration for piece in revolution.pieces if piece.states != 0)
         if "restitution" in contact:
             logarithm += 2 * math.log(RESTITUTION) * sum(piece.touching.size for piece in revolution.pieces)
     assert n_event > 50
     assert found[0] > 0.1
     trace = damping * 100 * motion.turn + contact.get("damping", 0.0) * pressed
-    assert found.sum() == pytest.approx((logarithm - trace) / 100, rel=1e-7)
+    assert found.sum() == pytest.approx((logarithm - trace) / 100, rel=allowed, abs=0.1 * allowed)
 
 
 def test_periodic_motion_has_the_logarithms_of_its_multipliers():

@@ -225,7 +225,7 @@ def test_forms_grow_by_the_energy_lost_and_given(case, mask):
     skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
     angle, duration = 1.3, 2e-3
     p, z = entered(case, mask, admissible(case, mask, rng), angle)
-    real, imaginary = case.library.exponents(mask)[0]
+    real, imaginary = case.library.exponents(mask)
     exponent = real + 1j * imaginary
     node, weight = np.polynomial.legendre.leggauss(20)
     panels = np.linspace(0, duration, 401)
@@ -278,14 +278,12 @@ def test_no_switch_function_vanishes_in_the_time_proved(case, mask):
 
 
 def test_modes_of_a_ring_are_solved_when_first_met():
-    """Room for them is settled before: the width decides in which order sums are taken."""
+    """Their tables have room for all of them."""
     setup = prepare(
         trial_rig(3), 150.0, contact=Contact(), integrator=Integrator(), samples_per_revolution=64
     )
-    width = setup.open_tables(FRICTION).bound.shape[2]
     library = setup.library(FRICTION)
     assert library.masks == [0]
-    assert library.width == width
     assert all(library.add(mask) for mask in range(1, 8))
 
 
@@ -295,8 +293,7 @@ def test_longest_step_within_a_count_of_ticks(count):
     assert 2**level <= count < 2 ** (level + 1)
 
 
-@pytest.mark.parametrize("law", ["sliding", "coulomb"])
-def test_large_modes_are_solved_once_for_both_tables(monkeypatch, law):
+def test_large_modes_are_solved_once_for_both_tables(monkeypatch):
     """What the tables hold that a motion is followed with those of its record take over, bit for bit."""
     monkeypatch.setattr(mode_library, "MOST_BYTES", 2**20)
     monkeypatch.setattr(mode_library, "FEW_PAIRS", 2)
@@ -305,11 +302,11 @@ def test_large_modes_are_solved_once_for_both_tables(monkeypatch, law):
         setup = prepare(
             trial_rig(3),
             180.0,
-            contact=Contact(friction_law=law),
+            contact=Contact(),
             integrator=Integrator(),
             samples_per_revolution=64,
         )
-        return setup, setup.friction_library(0.2) if law == "coulomb" else setup.library(0.2)
+        return setup, setup.library(0.2)
 
     setup, both = library()
     _, alone = library()

@@ -4,13 +4,11 @@ import numpy as np
 import pytest
 
 from rubhpc.integrate.reduced_model.contact_mode import SlidingPairs, solve_contact_mode
-from rubhpc.integrate.reduced_model.friction_mode import FrictionPairs, mask_of, solve_friction_mode
 from rubhpc.integrate.reduced_model.reduction import ReducedModel
 from rubhpc.integrate.reduced_model.touching import (
     OpenBodies,
     mode_among,
 )
-from rubhpc.kernels.friction_states import BACKWARD, FORWARD, OPEN, STUCK
 
 Q, N_ROTOR, N_STATOR = 6, 5, 2  # pairs, and degrees of the rotor and of each stator
 N = N_ROTOR + Q * N_STATOR
@@ -43,49 +41,17 @@ def bodies():
         carrier=np.zeros((0, 2, N)),
         probe=np.zeros((3, 0, N)),
     )
-    pairs = FrictionPairs(
-        gap_jacobian=np.where(sees, rng.normal(size=(Q, N)), 0.0),
-        friction_direction=np.where(sees, rng.normal(size=(Q, N)), 0.0),
-        friction=0.3,
-        static_ratio=1.4,
-        rim_speed=rng.uniform(0.5, 1.0, Q),
-    )
-    return reduced, pairs
+    gap, along = (np.where(sees, rng.normal(size=(Q, N)), 0.0) for _ in range(2))
+    return reduced, SlidingPairs(gap, gap + 0.3 * along)
 
 
-STATES = [
-    (OPEN,) * Q,
-    (FORWARD, OPEN, OPEN, STUCK, OPEN, OPEN),
-    (STUCK, BACKWARD, STUCK, OPEN, OPEN, FORWARD),
-    (STUCK,) * Q,
-]
-
-
-def solved(bodies, law, states):
-    """A contact mode of all bodies and of those that touch alone, with what it takes for energies."""
+@pytest.mark.parametrize("closed", [[], [0, 3], [0, 1, 2, 5], [0, 1, 2, 3, 4, 5]])
+def test_what_touches_moves_alone(bodies, closed):
     reduced, pairs = bodies
-    seen = np.abs(pairs.gap_jacobian) + np.abs(pairs.friction_direction)
-    closed = [i for i, state in enumerate(states) if state != OPEN]
+    seen = np.abs(pairs.gap_jacobian) + np.abs(pairs.force_direction)
+    among = OpenBodies(reduced, solve_contact_mode(reduced, *pairs, 0), seen)
     mask = sum(1 << i for i in closed)
-    along = pairs.gap_jacobian + 0.3 * pairs.friction_direction
-    directions = pairs.gap_jacobian, along
-    if law == "friction":
-        opened = solve_friction_mode(reduced, pairs, 0)
-        among, mask = OpenBodies(reduced, opened, seen), mask_of(states)
-        modes = [mode_among(bodies, reduced, pairs, opened, mask, None) for bodies in (None, among)]
-        return modes, among, closed, reduced, [pairs.friction_forces(mode) for mode in modes]
-    opened = solve_contact_mode(reduced, *directions, 0)
-    among = OpenBodies(reduced, opened, seen)
-    sliding = SlidingPairs(*directions, *((3e5, 40.0) if law == "penalty" else ()))
-    modes = [mode_among(of, reduced, sliding, opened, mask, None) for of in (None, among)]
-    reduced = sliding.damped(reduced, mask)
-    return modes, among, closed, reduced, [sliding.friction_forces(mode) for mode in modes]
-
-
-@pytest.mark.parametrize("law", ["sliding", "penalty", "friction"])
-@pytest.mark.parametrize("states", STATES)
-def test_what_touches_moves_alone(bodies, law, states):
-    (whole, own), among, closed, _, _ = solved(bodies, law, states)
+    whole, own = (mode_among(of, reduced, pairs, mask, None) for of in (None, among))
     touching = among.touching(closed)
     assert (touching is None) == (len(closed) == Q)
     if touching:
@@ -97,7 +63,7 @@ def test_what_touches_moves_alone(bodies, law, states):
         moving = np.exp(mode.exponent[:m] * 0.01) * (mode.enter[:m] @ start)
         taken = np.exp(mode.exponent[:m] * 0.01) * mode.take_off[:, :m]
         seen = [mode.motion[:, :m] @ moving, mode.switch[:, :m] @ moving, mode.motion[:, :m] @ taken.T]
-        rest = [mode.motion[:, m:], mode.switch[:, m:], mode.enter[m:], mode.take_off[:, m:], mode.drift[m:]]
+        rest = [mode.motion[:, m:], mode.switch[:, m:], mode.enter[m:], mode.take_off[:, m:]]
         turned.append([*(value.real for value in seen), *rest])
     for found, expected in zip(turned[1], turned[0], strict=True):
         assert found.shape == expected.shape
