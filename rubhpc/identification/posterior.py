@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.identification.candidates import Hypothesis, Outcome
+    from rubhpc.identification.comparison import Seen, Unknown
     from rubhpc.identification.nested import Sampled
     from rubhpc.identification.priors import Prior
     from rubhpc.identification.problem import Problem
@@ -62,15 +63,28 @@ class Found:
 
     @property
     def evidence(self) -> dict[str, tuple[float, float]]:
-        """Logarithm of the evidence and its standard error by hypothesis; a rub is one that touches.
+        """Logarithm of the evidence and its standard error by hypothesis.
 
-        Where no draw touches it is that of one draw in all.
+        A rub is one that touches; where no case of the study does, it has not been tried and is left out.
         """
         before, after = self.touching
-        least = 1.0 / self.rub.effective
-        ratio = math.log(max(after, least)) - math.log(max(before, least))
-        own = {self.problem.rub.name: (self.rub.log_evidence + ratio, self.rub.error)}
-        return own | {one.name: (found.log_evidence, found.error) for one, found in self.others.items()}
+        found = {one.name: (sampled.log_evidence, sampled.error) for one, sampled in self.others.items()}
+        if not before:
+            return found
+        ratio = math.log(max(after, np.finfo(float).tiny)) - math.log(before)
+        return {self.problem.rub.name: (self.rub.log_evidence + ratio, self.rub.error), **found}
+
+    def nearest(self, name: str) -> tuple[Seen, Unknown | None]:
+        """Return the features of the likeliest case of a hypothesis, and the unknown forces on it."""
+        if name == self.problem.rub.name:
+            touching = [i for i, outcome in enumerate(self.outcomes) if outcome.touches]
+            i = max(touching, key=lambda k: float(self.rub.log_likelihoods[k]))
+            seen = self.outcomes[i].seen
+            assert seen is not None
+            return seen, None
+        one, sampled = next(item for item in self.others.items() if item[0].name == name)
+        values = sampled.values[int(sampled.log_likelihoods.argmax())].tolist()
+        return self.problem.comparison.of(one.waves(values)), one.unknown(values)
 
 
 def tree_of(found: Found, draws: int, seed: int) -> xr.DataTree:

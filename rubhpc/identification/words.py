@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 _SURE, _LIKELY = math.log(100.0), math.log(3.0)  # odds, after Jeffreys
 _BEYOND = math.log(1e6)
+_NEVER = 1e-6
 _OPEN = 0.8  # of the spread of a prior, from which on a posterior says nothing
 _TIED = 0.9  # rank correlation of two quantities that are known together only
 _BAD = 4.0  # mean square of residuals over their standard deviation that no model should have
@@ -44,8 +45,10 @@ def in_words(found: Found, tree: xr.DataTree) -> Iterator[str]:
         f"{name} {value:.1f} +- {error:.1f}" for name, (value, error) in evidence.items()
     )
     best = max(evidence, key=lambda name: evidence[name][0])
+    if problem.rub.name not in evidence:
+        yield "no case of [grid] touches, so that a rub has not been tried; lower the clearance"
     yield from _verdict(evidence, problem.rub.name)
-    misfit = _misfit(found, best)
+    misfit = problem.comparison.misfit(*found.nearest(best))
     if misfit > _BAD:
         yield (
             f"but it does not explain the record: residuals are {math.sqrt(misfit):.2g} times what noise and "
@@ -53,28 +56,31 @@ def in_words(found: Found, tree: xr.DataTree) -> Iterator[str]:
         )
     if best != problem.rub.name:
         before, after = found.touching
-        if before < 1.0:
-            yield f"of the cases of [grid] a share of {before:.2g} touches, of those that fit {after:.2g}"
+        if 0.0 < before < 1.0:
+            share = f"{after:.2g}" if after > _NEVER else "almost none"
+            yield f"of the cases of [grid] a share of {before:.2g} touches, of those that fit {share}"
         return
     yield from _contacts(found, tree)
     yield from _values(found, tree)
 
 
 def _verdict(evidence: dict[str, tuple[float, float]], rub: str) -> Iterator[str]:
-    """Whether it is a rub, which of the others it is if not, and how sure that is."""
+    """Whether it is a rub, if that has been tried, which of the others it is if not, and how sure that is."""
     others = sorted((name for name in evidence if name != rub), key=lambda name: -evidence[name][0])
-    lead, odds, sure = _odds(evidence, rub, others[0])
-    if not odds:
-        yield f"the data do not distinguish a rub from {others[0]}"
-    elif lead > 0.0:
-        yield f"it is {sure}a rub: {odds} against {others[0]}{_BEFORE}"
-    else:
+    if rub in evidence:
+        lead, odds, sure = _odds(evidence, rub, others[0])
+        if not odds:
+            yield f"the data do not distinguish a rub from {others[0]}"
+            return
+        if lead > 0.0:
+            yield f"it is {sure}a rub: {odds} against {others[0]}{_BEFORE}"
+            return
         yield f"it is {sure}not a rub: {odds} against one{_BEFORE}"
-        _, odds, sure = _odds(evidence, others[0], others[1])
-        if odds:
-            yield f"it is {sure}{others[0]}: {odds} against {others[1]}"
-        else:
-            yield f"the data do not distinguish {others[0]} from {others[1]}"
+    _, odds, sure = _odds(evidence, others[0], others[1])
+    if odds:
+        yield f"it is {sure}{others[0]}: {odds} against {others[1]}"
+    else:
+        yield f"the data do not distinguish {others[0]} from {others[1]}"
 
 
 def _odds(evidence: dict[str, tuple[float, float]], one: str, other: str) -> tuple[float, str, str]:
@@ -85,21 +91,6 @@ def _odds(evidence: dict[str, tuple[float, float]], one: str, other: str) -> tup
         return lead, "", ""
     odds = f"odds of {math.exp(size):.2g} to 1" if size < _BEYOND else "odds of more than a million to 1"
     return lead, odds, "" if size > max(_SURE, doubt) else "probably "
-
-
-def _misfit(found: Found, best: str) -> float:
-    """Mean square of the residuals of the likeliest case over what is allowed."""
-    comparison, rub = found.problem.comparison, found.problem.rub
-    if best == rub.name:
-        touching = [i for i, outcome in enumerate(found.outcomes) if outcome.touches]
-        i = max(touching, key=lambda k: float(found.rub.log_likelihoods[k]))
-        seen = found.outcomes[i].seen
-        assert seen is not None
-        return comparison.misfit(seen)
-    other = next(one for one in found.others if one.name == best)
-    sampled = found.others[other]
-    values = sampled.values[int(sampled.log_likelihoods.argmax())].tolist()
-    return comparison.misfit(comparison.of(other.waves(values)), other.unknown(values))
 
 
 def _contacts(found: Found, tree: xr.DataTree) -> Iterator[str]:

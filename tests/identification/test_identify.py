@@ -100,6 +100,18 @@ def test_what_is_not_a_rub_is_said(tmp_path, kind):
         assert max(evidence["no rub"], evidence["misalignment"]) > evidence["rub"] + 10
 
 
+def test_a_clearance_that_may_be_wide_does_not_hide_a_healthy_machine(tmp_path):
+    columns = rubbing_machine.linear(False, 40, 0.05)
+    study = rubbing_machine.STUDY.replace('stop = "150 um"', 'stop = "400 um"')
+    files = rubbing_machine.write(tmp_path, columns, study)
+    text = "\n".join(rubhpc.identify(*files, **SMALL).lines)
+    assert "it is not a rub: odds of more than a million to 1 against one" in text
+    files[1].write_text(study.replace('"120 um"', '"300 um"'))
+    text = "\n".join(rubhpc.identify(*files, **SMALL).lines)
+    assert "no case of [grid] touches, so that a rub has not been tried" in text
+    assert "it is probably no rub" in text
+
+
 def test_a_speed_that_is_known_roughly_is_refined(tmp_path):
     columns = rubbing_machine.linear(True, 40, 0.05)
     del columns["key_phasor"]

@@ -54,6 +54,7 @@ class Contacts(NamedTuple):
     age: Floats  # (q,), s, of the states
     memory: NDArray[Any]  # (1,)
 
+
 WHY = {  # a case cannot continue
     0: "the motion diverges",
     JAMMED: "friction presses a closed gap further closed (Painleve's paradox): lower the friction",
