@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from rubhpc.branch import branch
     from rubhpc.errors import InputError, NoPeriodicMotion, RubError, StoppedEarly, StoreError
     from rubhpc.fem.assemble import assemble
+    from rubhpc.fem.dry_whirl import dry_whirl
     from rubhpc.fem.linear_design import linear_design
     from rubhpc.identification.identify import Identification, identify
     from rubhpc.integrate.branches.branch import Branch
@@ -32,14 +33,16 @@ if TYPE_CHECKING:
     from rubhpc.rig.reading import read_rig
     from rubhpc.rig.rig import Rig
     from rubhpc.rig.rotors import Load, Unbalance
-    from rubhpc.rig.stators import LumpedStator, MatrixStator, Stator
+    from rubhpc.rig.stators import Bore, LumpedStator, MatrixStator, Stator
     from rubhpc.run_up import run_up
     from rubhpc.running.driver import run
     from rubhpc.simulate import simulate
     from rubhpc.storage.summary import Summary
     from rubhpc.study.study import Study, read_study
+    from rubhpc.whirl_simulations import certify_whirl
 
 __all__ = [
+    "Bore",
     "Branch",
     "Carrier",
     "Identification",
@@ -64,7 +67,12 @@ __all__ = [
     "Unbalance",
     "assemble",
     "branch",
+<<<<<<< HEAD
     "identify",
+=======
+    "certify_whirl",
+    "dry_whirl",
+>>>>>>> main
     "least_knock",
     "linear_design",
     "measured",
@@ -80,6 +88,7 @@ __all__ = [
 
 # Module of each name; imported at first use, so that `import rubhpc` is fast.
 _HOMES = {
+    "Bore": "rubhpc.rig.stators:Bore",
     "Branch": "rubhpc.integrate.branches.branch:Branch",
     "Carrier": "rubhpc.rig.carriers:Carrier",
     "Identification": "rubhpc.identification.identify:Identification",
@@ -104,7 +113,12 @@ _HOMES = {
     "Unbalance": "rubhpc.rig.rotors:Unbalance",
     "assemble": "rubhpc.fem.assemble:assemble",
     "branch": "rubhpc.branch:branch",
+<<<<<<< HEAD
     "identify": "rubhpc.identification.identify:identify",
+=======
+    "certify_whirl": "rubhpc.whirl_simulations:certify_whirl",
+    "dry_whirl": "rubhpc.fem.dry_whirl:dry_whirl",
+>>>>>>> main
     "least_knock": "rubhpc.knocks:least_knock",
     "linear_design": "rubhpc.fem.linear_design:linear_design",
     "measured": "postproc.measured.measured:measured",

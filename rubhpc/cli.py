@@ -35,6 +35,10 @@ COMMANDS = {
         "rubhpc.commands.modes:modes",
         "Natural frequencies, damping ratios and whirl of a rig; Campbell diagram.",
     ),
+    "whirl": (
+        "rubhpc.commands.whirl:whirl",
+        "Dry whirl and whip that can exist in the bores of a rig, from receptances.",
+    ),
     "knock": (
         "rubhpc.commands.knock:knock",
         "The least knock that leads to sustained rub, over the speed.",

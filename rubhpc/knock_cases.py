@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
+    from rubhpc.fem.model import Model
     from rubhpc.study.cases import Case
     from rubhpc.study.study import Study
 
@@ -206,6 +207,13 @@ def dataset_of(search: Search, found: Mapping[str, LeastKnock]) -> xr.Dataset:
     )
 
 
+def impulse_scale(model: Model, reach: float) -> float:
+    """Return mass x first lateral frequency x reach (m), N s: a knock that moves the rotor about that far."""
+    is_vertical = np.array([name == "v" for _, name in model.rotor.degrees])
+    mass = float(model.rotor.mass[np.ix_(is_vertical, is_vertical)].sum())
+    return mass * first_lateral_frequency(model) * reach
+
+
 class _Knocks:
     """Knocks on one case; as a function of impulse and direction, whether one leads to rub."""
 
@@ -222,10 +230,7 @@ class _Knocks:
             samples_per_revolution=study.recording.samples_per_revolution,
             model=model,
         )
-        is_vertical = np.array([name == "v" for _, name in model.rotor.degrees])
-        mass = float(model.rotor.mass[np.ix_(is_vertical, is_vertical)].sum())
-        reach = abs(case.clearance) or case.contact_free_amplitude
-        self.scale = mass * first_lateral_frequency(model) * reach
+        self.scale = impulse_scale(model, abs(case.clearance) or case.contact_free_amplitude)
 
     def compile(self) -> None:
         """Compile what a knock calls."""

@@ -27,6 +27,7 @@ from rubhpc.schema import (
     RECORD_END,
     TURNED,
     VARIABLES,
+    bore_variables,
     drive_variables,
     probe_variables,
     run_up_variables,
@@ -151,7 +152,7 @@ def run_up(
         else integrate_run_up(one.setup, law, **given_case)
     )
     signals = by_name(found.whole, one.setup.model)
-    known = VARIABLES | probe_variables((probe.name, probe.quantity) for probe in measured)
+    known = VARIABLES | bore_variables() | probe_variables((probe.name, probe.quantity) for probe in measured)
     variables: dict[str, Any] = {
         name: (known[name].dims, values, _about(known[name].unit, known[name].long_name))
         for name, values in signals.items()

@@ -71,6 +71,15 @@ _WAVEFORMS = _of_signals("", "waveform", "sample", "{}")
 _SPECTRA = _of_signals("spectrum_", "spectrum", "order", "amplitude (zero to peak) of the {}")
 _SECTIONS = _of_signals("section_", "section", "section", "{}, once a revolution", "float64", SECTION_NAMES)
 
+CONTACT_ANGLE = "contact_angle"
+# Of records with a bore among the stators, besides the signals.
+_OF_BORES = (
+    (CONTACT_ANGLE, "rad", "angle of the contact point from straight up (NaN: no contact)"),
+    ("contact_force_vertical", "N", "vertical contact force on the rotor, with friction"),
+    ("contact_force_horizontal", "N", "horizontal contact force on the rotor, with friction"),
+)
+RUB_KIND = ("none", "partial", "forward", "backward_slipping", "rolling")
+
 FINAL_STATE = "final_state"
 _STATE = Variable(
     name=FINAL_STATE,
@@ -97,6 +106,14 @@ _FLAGS = (
     Variable(name="status", role="flag", dtype="int8", long_name="state of the case", flags=STATUS),
     Variable(name="regime", role="flag", dtype="int8", long_name="regime of the motion", flags=REGIME),
 )
+_RUBS = (
+    _measure("rub_kind", "1", "rub in a bore (-1: another stator)", "stator", dtype="int8", flags=RUB_KIND),
+    _measure("whirl_frequency", "rad s-1", "whirl of the contact in a bore, positive forward", "stator"),
+    _measure("contact_angle_mean", "rad", "mean angle of the contact force in a bore, from up", "stator"),
+    _measure("contact_angle_spread", "rad", "angular deviation of that angle, to the root of two", "stator"),
+    _measure("contact_arc", "rad", "arc of a bore that is touched, to two pi", "stator"),
+)
+BORE_MEASURES = tuple(measure.name for measure in _RUBS)
 _MEASURES = (
     _measure("period", "1", "period in revolutions (0: none found)", dtype="int16"),
     _measure("lyapunov_exponent", "1", "largest Lyapunov exponent per revolution (NaN: not measured)"),
@@ -112,6 +129,7 @@ _MEASURES = (
     _measure("contact_impulse", "N s", "contact impulse per revolution", "stator"),
     _measure("friction_work", "J", "work of friction per revolution", "stator"),
     _measure("minimum_slip_speed", "m s-1", "lowest slip speed in contact", "stator", worst="min"),
+    *_RUBS,
     _measure("force_over_euler_load", "1", "peak contact force over the stator's Euler load", "stator"),
     _measure("tip_deflection_ratio", "1", "peak lateral tip deflection over the stator's length", "stator"),
     _measure(
@@ -158,6 +176,14 @@ _MEASURES = (
 VARIABLES: dict[str, Variable] = {
     v.name: v for v in (*_WAVEFORMS, *_SPECTRA, *_SECTIONS, _STATE, *_SETTINGS, *_FLAGS, *_MEASURES)
 }
+
+
+def bore_variables() -> dict[str, Variable]:
+    """Return the waveforms of records with a bore: mean over the sample's interval, by the contact force."""
+    return {
+        n: Variable(name=n, role="waveform", dims=("stator", "sample"), dtype="float32", unit=u, long_name=t)
+        for n, u, t in _OF_BORES
+    }
 
 
 # What a probe measures: unit, long name.
@@ -302,8 +328,8 @@ def drive_measures() -> tuple[Variable, ...]:
 
 def role_of(name: str) -> str:
     """Return the role of a variable, also of a probe; "" where it is none of a store."""
-    if name in VARIABLES:
-        return VARIABLES[name].role
+    if (known := VARIABLES | bore_variables()).get(name):
+        return known[name].role
     if name.startswith(POINT):
         return BRANCH
     if name in (measure.name for measure in drive_measures()):
@@ -315,7 +341,7 @@ def role_of(name: str) -> str:
 
 def is_signal(name: str) -> bool:
     """Whether a name is that of a recorded signal, also of a probe."""
-    return name in SIGNAL_NAMES or name.startswith(PROBE)
+    return name in SIGNAL_NAMES or name in bore_variables() or name.startswith(PROBE)
 
 
 def case_measures() -> tuple[Variable, ...]:

@@ -73,7 +73,6 @@ SLOW = (
     "integrate/reduced_model/test_mode_library.py::test_no_switch_function",
     "integrate/reduced_model/test_truncation.py::test_contacts_that_feel_motion_along_the_rim_need_more_modes",
     "integrate/test_periodic.py::test_failure_says_why",
-    "integrate/branches/test_branch.py::test_several_pairs_that_slide_under_coulombs_law_branch_as_pairs_that_slide",
     "integrate/test_periodic.py::test_motion_beside_it_draws_near_by_the_largest_multiplier",
     "integrate/measuring/test_regimes_lyapunov.py",
     "integrate/changing_speed/test_filled_modes.py",

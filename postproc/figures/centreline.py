@@ -11,7 +11,7 @@ from postproc.figures.run_up_marks import APART, draw_rotation, name_speeds
 from postproc.signals.places import moved_at
 from postproc.signals.run_ups import mean_positions
 from postproc.store.attributes import MEASURED
-from postproc.store.rig_of_case import stator_places, stators_around
+from postproc.store.rig_of_case import bores_around, stator_places, stators_around
 from rubhpc.units import scale_for
 
 if TYPE_CHECKING:
@@ -98,8 +98,10 @@ def draw_centreline(
 
 
 def _clearance(cases: xr.Dataset) -> tuple[float, ...] | None:
-    """Clearance of a ring around the place, as a circle, m; None without a ring, or where it is unknown."""
+    """Clearance of a ring or bore around the place, as a circle, m; None without one, or where unknown."""
     is_known = "clearance" in cases.coords and cases["clearance"].size == 1
-    if not is_known or len(stators_around(cases)) < RING:
+    if not is_known or (len(stators_around(cases)) < RING and not bores_around(cases)):
         return None
-    return (float(cases["clearance"].item()), *stator_places(cases)[0][2:])
+    places = stator_places(cases)
+    angle, offset, *centre = next((place for place in places if place[0] is None), places[0])
+    return (float(cases["clearance"].item()) + (offset if angle is None else 0.0), *centre)

@@ -14,7 +14,7 @@ from postproc.figures.small_multiples import legend_below, overlaid
 from postproc.signals.places import moved_at
 from postproc.signals.spectra import samples_per_revolution
 from postproc.signals.waveforms import orbit_data
-from postproc.store.rig_of_case import stator_places, stators_around
+from postproc.store.rig_of_case import bores_around, stator_places, stators_around
 from postproc.store.units import short_name
 from postproc.store.variables import require_results
 from rubhpc.units import scale_for
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 _MARGIN = 1.15  # of the size of an orbit or a clearance, around it
 _NEAR = 5.0  # times the size of the orbit, within which the clearance is drawn
 _WHOLE = 3.5  # the same, up to which all of the clearance is, or the centre without loads
+RIMS = ("rim_vertical", "rim_horizontal")
 _ASIDE = 0.25  # of the size of the orbit, by which its middle is off the centre where that is marked
 
 
@@ -158,8 +159,12 @@ def _draw_around(
     is_of_gap = (
         "clearance" in data and bool(stators_around(data)) and data["vertical"].attrs.get("units", "m") == "m"
     )
-    gap = float(data["clearance"].values) * factor if is_of_gap else 0.0
-    ring = centre + (_shifts(data).mean(axis=0) * factor if "carrier_vertical" in data else 0.0)
+    gap, ring = float(data["clearance"].values) * factor if is_of_gap else 0.0, centre
+    if "carrier_vertical" in data:
+        ring = ring + _shifts(data).mean(axis=0) * factor
+    if is_of_gap and bores_around(data):
+        _, offsets, across, up = zip(*(p for p in stator_places(data) if p[0] is None), strict=True)
+        gap, ring = gap + factor * max(offsets), ring + factor * np.array([np.mean(across), np.mean(up)])
     toward = view.middle - ring
     away = float(np.hypot(*toward))
     apart = abs(gap - away)  # of the circle from the middle of the orbit
@@ -168,6 +173,7 @@ def _draw_around(
     corners = [view.middle - reach, view.middle + reach]
     if is_near and gap > 0.0:
         draw_stators(data, ax, factor, max(reach, 0.8 * gap if is_whole else 0.4 * apart), centre)
+        _draw_contact_points(data, ax, factor, centre)
         beyond = ring + (gap + 0.1 * apart) * toward / (away or 1.0)
         corners += [ring - _MARGIN * gap, ring + _MARGIN * gap] if is_whole else [beyond]
     off = view.middle - centre
@@ -180,6 +186,14 @@ def _draw_around(
     ax.dataLim.set_points(np.array([np.min(corners, axis=0), np.max(corners, axis=0)]))
     ax.margins(0.0)
     return is_seen
+
+
+def _draw_contact_points(data: xr.Dataset, ax: Axes, factor: float, centre: NDArray[np.float64]) -> None:
+    """Draw where the disc touches bores: the positions of its centre at which it touches there."""
+    rims = (data[name].values for name in RIMS) if RIMS[0] in data else ((), ())
+    for i, (up, across) in enumerate(zip(*rims, strict=True)):
+        y, z = up * factor + centre[1], across * factor + centre[0]
+        ax.plot(z, y, ".", color="C3", markersize=2, zorder=2, label="_contact" if i else "contact point")
 
 
 def _draw_probe(name: str, angle: float, ax: Axes, view: _View) -> NDArray[np.float64]:
@@ -216,7 +230,8 @@ def draw_stators(
 ) -> None:
     """Add the clearance circle about the `centre` and a stub of each stator; `reach` is that of the orbit.
 
-    Stators on a carrier, which may move by more than the clearance, are drawn at its mean displacement.
+    Stators on a carrier, which may move by more than the clearance, are drawn at its mean displacement, and
+    so are bores, each a circle of its own.
     """
     from matplotlib.patches import Circle, Polygon
 
@@ -228,11 +243,20 @@ def draw_stators(
         shifts = shifts + centre
     if is_moved:
         shifts = shifts + _shifts(data) * factor
-    middle = shifts.mean(axis=0) if len(shifts) else np.zeros(2)
+    stubs = [(i, angle, offset) for i, (angle, offset, *_) in enumerate(places) if angle is not None]
+    if len(stubs) < len(places):
+        wall: dict[str, Any] = {"edgecolor": "0.35", "linewidth": 0.9, "fill": False}
+        for (angle, offset, *_), at in zip(places, shifts, strict=True):
+            if angle is None:
+                ax.add_patch(Circle((at[0], at[1]), clearance + offset * factor, **wall))
+        ax.plot([], [], color="0.35", linewidth=0.9, label="bore, mean position" if is_moved else "bore")
+        if not stubs:
+            return
+    middle = shifts[[i for i, *_ in stubs]].mean(axis=0) if stubs else np.zeros(2)
     ax.add_patch(Circle((middle[0], middle[1]), clearance, fill=False, zorder=1, **edge))
     ax.plot([], [], color="0.6", linestyle=":", label="clearance")
-    half_angle = math.pi / max(len(places), 3)  # the stators of a ring do not overlap
-    for i, (angle, offset, *_) in enumerate(places):
+    half_angle = math.pi / max(len(stubs), 3)  # the stators of a ring do not overlap
+    for k, (i, angle, offset) in enumerate(stubs):
         gap = clearance + offset * factor
         # Normal from the disc to the stator and tangent along its face; the plane is (horizontal, vertical).
         n, t = np.array([np.sin(angle), np.cos(angle)]), np.array([np.cos(angle), -np.sin(angle)])
@@ -240,7 +264,7 @@ def draw_stators(
         face = np.array([gap * n - half, gap * n + half]) + shifts[i]
         block = Polygon([*face, *(face[::-1] + deep)], facecolor="0.85", edgecolor="none", zorder=1)
         name = "stator, mean position" if is_moved else "stator"
-        block.set_label("_stator" if i else name)  # one of them is enough for a legend
+        block.set_label("_stator" if k else name)  # one of them is enough for a legend
         ax.add_patch(block)
         ax.plot(face[:, 0], face[:, 1], color="0.35", linewidth=0.9, zorder=2)
 

@@ -15,6 +15,7 @@ from rubhpc.schema import (
     MISSING,
     RECORD_END,
     REGIME,
+    RUB_KIND,
     SCHEMES,
     SETTLED,
     STATUS,
@@ -38,7 +39,8 @@ REGIME_COLORS = ("#56B4E9", "#009E73", "#E69F00", "#D55E00", "#CC79A7")
 PERIOD_COLORS = ("#D55E00", "#88CCEE", "#332288", "#999933", "#CC79A7")  # none, P1 to P4
 SETTLED_COLORS = ("#D55E00", "#56B4E9")
 NOT_SETTLED = SETTLED[0].replace("_", " ")
-SCHEME_COLORS = ("#56B4E9", "#E69F00", "#009E73", "#CC79A7")
+SCHEME_COLORS = ("#56B4E9", "#E69F00", "#009E73", "#CC79A7", "#0072B2")
+RUB_COLORS = ("#ededed", "#56B4E9", "#009E73", "#E69F00", "#D55E00")
 STATUS_COLORS = ("#ededed", "#009E73", "#000000", "#D55E00", "#B8DFD2")
 # Motions that starts reach, by number; the contact-free one has the colour of its regime.
 MOTION_COLORS = (
@@ -53,13 +55,14 @@ MOTION_COLORS = (
     "#882255",
 )
 WARNING = "#D55E00"  # seen on the dark and on the light end of the colour bar
-CATEGORIES = ("status", "regime", "period", "settled", "scheme", "record_end")
+CATEGORIES = ("status", "regime", "period", "settled", "scheme", "record_end", "rub_kind")
 _FLAGS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "status": (STATUS, STATUS_COLORS),
     "regime": (tuple(name.replace("quasi_", "quasi-").replace("_", " ") for name in REGIME), REGIME_COLORS),
     "settled": (tuple(name.replace("_", " ") for name in SETTLED), SETTLED_COLORS),
     "scheme": (tuple(name.replace("_", " ") for name in SCHEMES), SCHEME_COLORS),
     "record_end": (tuple(name.replace("_", " ") for name in RECORD_END), SCHEME_COLORS),
+    "rub_kind": (tuple(name.replace("_", " ") for name in RUB_KIND), RUB_COLORS),
 }
 
 

@@ -44,7 +44,7 @@ _FIRST = (
     "peak_to_peak_vertical",
     "peak_to_peak_horizontal",
 )
-_FLAGS = ("status", "regime", "period", "validity", "settled", "scheme", "record_end")
+_FLAGS = ("status", "regime", "period", "validity", "settled", "scheme", "record_end", "rub_kind")
 _WITHIN, *_BEYOND = ("#009E73", "#E69F00", "#56B4E9", "#CC79A7", "#F0E442", "#0072B2", "#D55E00", "#8C5A2B")
 _MOTION = ("peak_to_peak_vertical", "peak_to_peak_horizontal")
 # Measures of which all that is named has its unit.

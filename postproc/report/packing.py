@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    from postproc.store.rig_of_case import Place
+
     Arrays = list[NDArray[np.uint16]]
 
 DECADES = 5.0  # of a spectrum, below its highest line; what is lower is not carried
@@ -158,7 +160,7 @@ LEVELS = (  # of a page with a limited size, from the best
 )
 
 
-def pack_case(case: xr.Dataset, detail: Detail, places: list[tuple[float, ...]] | None = None) -> bytes:
+def pack_case(case: xr.Dataset, detail: Detail, places: list[Place] | None = None) -> bytes:
     """Return one case, loaded, as a record for the page.
 
     Values are SI. What the store does not keep is left out; spectra are taken over whole periods where

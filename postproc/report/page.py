@@ -24,7 +24,7 @@ from postproc.report.facts import (
 )
 from postproc.report.grid import Measures, described_axes, validity_text
 from postproc.report.packing import as_text
-from postproc.report.pictures import branch_facts, design_facts, run_up_facts
+from postproc.report.pictures import branch_facts, design_facts, run_up_facts, whirl_facts
 from postproc.report.rig_views import description, end_view, side_view
 from postproc.store.attributes import table_of
 from postproc.store.axes import source
@@ -39,6 +39,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     import xarray as xr
+
+    from postproc.store.rig_of_case import Place
 
 _ASSETS = files("postproc.report") / "assets"
 _SCRIPTS = ("data.js", "chart.js", "map.js", "panels.js", "page.js")
@@ -117,6 +119,7 @@ class Page:
             "failures": failures(store, axes),
             "n_done": len(self.cases.done),
             "design": design_facts(store),
+            "whirl": whirl_facts(store),
             "branches": branch_facts(store),
             "run_ups": run_up_facts(self._whole),
         }
@@ -143,7 +146,7 @@ class Page:
             "reasons": {str(i): text for i, text in store.attrs.get("reasons", {}).items()},
         }
 
-    def _places(self) -> list[tuple[float, ...]]:
+    def _places(self) -> list[Place]:
         try:
             return stator_places(self._store)
         except RubError:

@@ -1,4 +1,4 @@
-"""Facts with pictures on the page: linear design, branches of periodic motions, run-ups and driven rotors."""
+"""Facts with pictures on the page: linear design, dry whirl, branches, run-ups and driven rotors."""
 
 from __future__ import annotations
 
@@ -18,12 +18,16 @@ from postproc.figures.linear_design import campbell_diagram
 from postproc.figures.multipliers import multipliers
 from postproc.figures.speed import speed
 from postproc.figures.waterfall import waterfall
+from postproc.figures.whirl_chart import draw_whirl
+from postproc.store.attributes import table_of
 from postproc.store.axes import axes_of
 from postproc.store.branch_points import followed, is_of_points, other_axes
 from postproc.store.rig_of_case import rig_of
 from postproc.store.run_ups import is_run_up
 from postproc.store.units import displayed, written_value
 from rubhpc.errors import RubError
+from rubhpc.fem.dry_whirl import MOST_SETTINGS, MOST_SPEEDS, dry_whirl, in_words, thinned
+from rubhpc.rig.normal_law import NormalLaw
 from rubhpc.rig.reading import rig_from_dict
 from rubhpc.schema import AMPLITUDE, DONE, PROBE
 
@@ -143,6 +147,44 @@ def design_facts(store: xr.Dataset) -> dict[str, Any]:
         return _facts(json.dumps(rig_of(store).as_dict(), sort_keys=True))
     except RubError as error:
         return {"rows": [], "diagram": "", "text": f"There is no linear design of this rig: {error}."}
+
+
+def whirl_facts(store: xr.Dataset) -> dict[str, Any]:
+    """Return what the page says of dry whirl in bores, of the rig as the study states it.
+
+    Returns
+    -------
+    dict
+        `sentences`: one for each bore, none where the rig has no bore; `chart`: an address that contains it.
+    """
+    try:
+        rig = rig_of(store)
+        if not any(stator.is_bore for stator in rig.stator):
+            return {"sentences": [], "chart": ""}
+        contact = table_of(store, "study").get("contact", {})
+        return _whirls(
+            json.dumps(rig.as_dict(), sort_keys=True),
+            NormalLaw(
+                kind=contact.get("law", "lagrange"), **{k: contact.get(k) for k in ("stiffness", "damping")}
+            ),
+            None if is_run_up(store) else tuple(thinned(store["spin_speed"], MOST_SPEEDS)),
+            *(tuple(thinned(store[name], MOST_SETTINGS)) for name in ("clearance", "friction")),
+        )
+    except RubError as error:
+        return {"sentences": [f"There is no chart of dry whirl: {error}."], "chart": ""}
+
+
+@cache
+def _whirls(
+    table: str,
+    law: NormalLaw,
+    speeds: tuple[float, ...] | None,
+    clearances: tuple[float, ...],
+    frictions: tuple[float, ...],
+) -> dict[str, Any]:
+    found = dry_whirl(rig_from_dict(json.loads(table), "rig"), speeds, clearances, frictions, law=law)
+    drawing = draw_whirl(found)
+    return {"sentences": in_words(found), "chart": picture(drawing, is_shared=drawing.is_shared)}
 
 
 @cache

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 _SIDE_WIDTH, _END_WIDTH, _HEIGHT = 620.0, 270.0, 250.0  # px
 _MARGIN = 34.0
+SIDES = (0.0, math.pi)  # angles at which a bore is cut, from the side
+AROUND = (0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi)
 _LUMPED_DEPTH = 0.35  # of the rim's radius: how deep a stator without a shape is drawn
 LEAST = 2.5  # px: a thing that is thinner would not be seen
 SPRING = 16.0  # px: length of a spring
@@ -96,7 +98,8 @@ def end_view(rig: Rig) -> str:
     around = [s for s in rig.stator if s.node == rig.stator[0].node]
     rim = max(rig.contact_radius(s) or 0.0 for s in around)
     places = [tip_and_root(s, rig.contact_radius(s) or rim) for s in around]
-    corners = [(-rim, -rim), (rim, rim), *(point for place in places for point in place)]
+    far = max([rim, *(rim + depth(s, rim) for s in around if s.is_bore)])
+    corners = [(-far, -far), (far, far), *(point for place in places for point in place)]
     left, right = min(z for z, _ in corners), max(z for z, _ in corners)
     low, high = min(y for _, y in corners), max(y for _, y in corners)
     scale = min((_END_WIDTH - 2 * _MARGIN) / (right - left), (_HEIGHT - 30) / (high - low))
@@ -113,16 +116,20 @@ def end_view(rig: Rig) -> str:
         parts.append(f'<circle class="shaft" cx="{frame.x0:.1f}" cy="{frame.y0:.1f}" r="{shaft:.1f}"/>')
     for carrier in rig.carrier:
         carried = [
-            (s.angle, math.hypot(*far))
-            for s, (_, far) in zip(around, places, strict=True)
+            (angle, math.hypot(*root))
+            for s, (_, root) in zip(around, places, strict=True)
             if s.carrier == carrier.name
+            for angle in (AROUND if s.is_bore else (s.angle,))
         ]
         parts += _carrier(frame, carried)
-    parts += [_turned_stator(frame, s, *place) for s, place in zip(around, places, strict=True)]
+    for stator, place in zip(around, places, strict=True):
+        parts.append(_hole(frame, stator, rim) if stator.is_bore else _turned_stator(frame, stator, *place))
     parts.append(_spin(frame, 0.55 * scale * rim))
     parts.append(scale_bar(frame, frame.x(left), bottom + 18))
-    angles = ", ".join(f"{math.degrees(s.angle):.4g}°" for s in around)
-    title = f"Along the shaft, to scale: stators at {angles} from straight up; positive spin is clockwise"
+    angles = ", ".join(f"{math.degrees(s.angle):.4g}°" for s in around if not s.is_bore)
+    known = [f"stators at {angles} from straight up"] if angles else []
+    known += ["a bore"] if any(s.is_bore for s in around) else []
+    title = f"Along the shaft, to scale: {' and '.join(known)}; positive spin is clockwise"
     if rig.carrier:
         title += f"; carriers, not to scale: {', '.join(carrier.name for carrier in rig.carrier)}"
     return svg(_END_WIDTH, bottom + FOOT, parts, title)
@@ -133,11 +140,22 @@ def depth(stator: AnyStator, radius: float) -> float:
     return stator.length if isinstance(stator, Stator) else _LUMPED_DEPTH * radius
 
 
-def tip_and_root(stator: AnyStator, radius: float) -> tuple[Point, Point]:
-    """Return where a stator begins and ends in the plane (z, y), m."""
-    sine, cosine = math.sin(stator.angle), math.cos(stator.angle)
+def tip_and_root(stator: AnyStator, radius: float, angle: float | None = None) -> tuple[Point, Point]:
+    """Return where a stator, or a bore at an angle, begins and ends in the plane (z, y), m."""
+    angle = stator.angle if angle is None else angle
+    sine, cosine = math.sin(angle), math.cos(angle)
     far = radius + depth(stator, radius)
     return (radius * sine, radius * cosine), (far * sine, far * cosine)
+
+
+def _hole(frame: Frame, stator: AnyStator, radius: float) -> str:
+    """Return a ring around the disc; its thickness has no meaning."""
+    deep = frame.scale * depth(stator, radius)
+    middle = frame.scale * radius + deep / 2 + 2
+    at = f'cx="{frame.x0:.1f}" cy="{frame.y0:.1f}" r="{middle:.1f}"'
+    return (
+        f'<circle class="stator lumped" {at} style="fill:none;stroke-width:{deep:.1f};stroke-opacity:.25"/>'
+    )
 
 
 def _turned_stator(frame: Frame, stator: AnyStator, tip: Point, root: Point) -> str:
@@ -244,8 +262,9 @@ def _reach(rig: Rig, rotor: Rotor) -> tuple[float, float]:
     ends = [_radius(rotor), *(_rim(d) for d in rotor.disc)]
     above, below = max(ends), max(ends)
     for stator in rig.stator:
-        for _, y in tip_and_root(stator, rig.contact_radius(stator) or 0.0):
-            above, below = max(above, y), max(below, -y)
+        for angle in SIDES if stator.is_bore else (stator.angle,):
+            for _, y in tip_and_root(stator, rig.contact_radius(stator) or 0.0, angle):
+                above, below = max(above, y), max(below, -y)
     return above, below
 
 
@@ -290,7 +309,13 @@ def _disc(frame: Frame, at: float, disc: Disc) -> str:
 
 
 def _stator(frame: Frame, at: float, stator: AnyStator, radius: float) -> str:
-    (_, tip), (_, root) = tip_and_root(stator, radius)
+    if stator.is_bore:
+        return "".join(_section(frame, at, stator, radius, angle) for angle in SIDES)
+    return _section(frame, at, stator, radius, stator.angle)
+
+
+def _section(frame: Frame, at: float, stator: AnyStator, radius: float, angle: float) -> str:
+    (_, tip), (_, root) = tip_and_root(stator, radius, angle)
     is_beam = isinstance(stator, Stator)
     along, across = stator.sides if isinstance(stator, Stator) else (0.0, 0.0)
     width = max(frame.scale * along, LEAST if is_beam else 14.0)
@@ -300,7 +325,7 @@ def _stator(frame: Frame, at: float, stator: AnyStator, radius: float) -> str:
     if bottom - top < high:  # it points at the reader, or away
         return rect(frame.x(at) - width / 2, (top + bottom - high) / 2, width, high, f"{kind} hidden")
     part = rect(frame.x(at) - width / 2, top, width, bottom - top, kind)
-    side = -1 if depth(stator, radius) * math.cos(stator.angle) > 0 else 1
+    side = -1 if depth(stator, radius) * math.cos(angle) > 0 else 1
     if stator.carrier is not None:
         return part
     return part + wall(frame.x(at) - 12, frame.x(at) + 12, frame.y(root), side)
@@ -311,7 +336,10 @@ def _carriers(frame: Frame, nodes: list[float], rig: Rig) -> list[str]:
     farthest: dict[tuple[str, int, int], float] = {}  # carrier, node and side -> height, m
     for stator in rig.stator:
         _, (_, root) = tip_and_root(stator, rig.contact_radius(stator) or 0.0)
-        if stator.carrier is not None and abs(root) > 1e-3 * (depth(stator, 1.0) or 1.0):
+        if stator.is_bore and stator.carrier is not None:
+            farthest[stator.carrier, stator.node, -1] = root
+            farthest[stator.carrier, stator.node, 1] = -root
+        elif stator.carrier is not None and abs(root) > 1e-3 * (depth(stator, 1.0) or 1.0):
             place = stator.carrier, stator.node, -1 if root > 0 else 1
             farthest[place] = max(farthest.get(place, root), root, key=abs)
     parts = []

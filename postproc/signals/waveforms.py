@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -11,11 +11,11 @@ import xarray as xr
 from postproc.signals.spectra import check_signal, samples_per_revolution
 from postproc.store.attributes import MEASURED
 from postproc.store.axes import find_axis, source
-from postproc.store.rig_of_case import is_carried, rig_of
+from postproc.store.rig_of_case import bores_around, is_carried, rig_of, stator_places, stators_around
 from postproc.store.run_ups import first_around, is_run_up
 from postproc.store.select import narrow
 from rubhpc.errors import InputError
-from rubhpc.schema import is_signal
+from rubhpc.schema import CONTACT_ANGLE, is_signal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -86,7 +86,9 @@ def orbit_data(
     """Return the last revolutions of vertical and horizontal motion, with the clearance; lazy.
 
     Of one case whose stators stand on a carrier, `carrier_vertical` and `carrier_horizontal` (m, over the
-    stators) are where that is on average in these revolutions.
+    stators) are where that is on average in these revolutions; of bores, where the hole is. There
+    `rim_vertical` and `rim_horizontal` (m, over the bores and samples) are the centre of a rim that touches
+    the hole at the contact point.
 
     Parameters
     ----------
@@ -106,11 +108,28 @@ def orbit_data(
     names = ["vertical", "horizontal", *([] if MEASURED in store.attrs else ["clearance"])]
     data = narrow(store, names, spread)
     data = _kept(store, data, revolutions, over, at)
-    if not spread and is_carried(data) and all(name in store for name in NEEDED):
-        tips = _kept(store, narrow(store, NEEDED, ["stator"]), revolutions, None, at)
+    bores = bores_around(data)
+    if not spread and (is_carried(data) or bores) and all(name in store for name in NEEDED):
+        needed = [*NEEDED, *([CONTACT_ANGLE] if CONTACT_ANGLE in store and bores else [])]
+        tips = _kept(store, narrow(store, needed, ["stator"]), revolutions, None, at)
         moved = zip(("carrier_vertical", "carrier_horizontal"), mean_shift(tips).T, strict=True)
         data = data.assign({name: ("stator", values, {"units": "m"}) for name, values in moved})
+        if CONTACT_ANGLE in tips:
+            data = data.assign(_rims(tips, float(data["clearance"].values), bores))
     return data
+
+
+def _rims(tips: xr.Dataset, clearance: float, bores: list[int]) -> dict[str, Any]:
+    """Return the centres of rims that touch some bores where the contact is, NaN without contact."""
+    reach = {i: clearance + stator.clearance_offset for i, stator in enumerate(rig_of(tips).stator)}
+    centres = dict(zip(stators_around(tips), stator_places(tips), strict=True))
+    turns = (("vertical", "stator_axial", np.cos, 3), ("horizontal", "stator_lateral", np.sin, 2))
+    found = {}
+    for name, moved, along, k in turns:
+        hole, angle = (tips[signal].transpose("stator", "sample") for signal in (moved, CONTACT_ANGLE))
+        at = [hole.values[i] + centres[i][k] + reach[i] * along(angle.values[i]) for i in bores]
+        found[f"rim_{name}"] = (("bore", "sample"), np.array(at, dtype=float), {"units": "m"})
+    return found
 
 
 def _kept(
@@ -169,7 +188,8 @@ def mean_shift(tips: xr.Dataset) -> NDArray[np.float64]:
     """Return how far the carrier of each stator has moved up and to +z on average, (n_stator, 2), m.
 
     It is read from the tips that touch nothing, which move with it: `v cos a + w sin a` outwards and
-    `w cos a - v sin a + s` along the rim, where s is a turn. Stators on the ground have not moved.
+    `w cos a - v sin a + s` along the rim, where s is a turn. Stators on the ground have not moved. Of
+    a bore it is how far the hole has moved.
 
     Parameters
     ----------
@@ -179,8 +199,10 @@ def mean_shift(tips: xr.Dataset) -> NDArray[np.float64]:
     stators = rig_of(tips).stator
     axial, lateral, force = (tips[name].transpose("stator", "sample").values.mean(axis=1) for name in NEEDED)
     shift = np.zeros((len(stators), 2))
-    for name in {stator.carrier for stator in stators} - {None}:
-        carried = np.array([i for i, stator in enumerate(stators) if stator.carrier == name])
+    is_bore = np.array([stator.is_bore for stator in stators])
+    shift[is_bore] = np.stack([axial, lateral], axis=1)[is_bore]
+    for name in {stator.carrier for stator in stators if not stator.is_bore} - {None}:
+        carried = np.flatnonzero([stator.carrier == name and not stator.is_bore for stator in stators])
         free = carried[force[carried] == 0.0]
         seen = free if free.size > 1 else carried
         c, s = (f(np.array([stators[i].angle for i in seen])) for f in (np.cos, np.sin))

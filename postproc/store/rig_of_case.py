@@ -12,6 +12,7 @@ from rubhpc.errors import InputError
 from rubhpc.models import ABSENT, in_words
 from rubhpc.rig.reading import rig_from_dict, with_keys
 from rubhpc.rig.stators import Stator, geometries
+from rubhpc.schema import BORE_MEASURES
 from rubhpc.study.axes import coordinate_of, is_of_table
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from rubhpc.fem.modes import Mode
     from rubhpc.rig.rig import Rig
 
+Place = tuple[float | None, float, float, float]  # of a stator: `stator_places`
 ROTOR_MODES = ("lateral", "torsional")
 
 
@@ -160,10 +162,10 @@ def stators_around(case: xr.Dataset) -> list[int]:
     return [i for i, stator in enumerate(rig_of(case).stator) if stator.node == node]
 
 
-def stator_places(case: xr.Dataset) -> list[tuple[float, ...]]:
+def stator_places(case: xr.Dataset) -> list[Place]:
     """Return angle (rad, from straight up with the spin) and clearance offset (m) of the stators around.
 
-    Then follow the horizontal and the vertical position, m, of the shaft about which they are set.
+    Then follow the horizontal and the vertical position, m, about which they are set. A bore has no angle.
     """
     from rubhpc.fem.assemble import assemble
 
@@ -171,16 +173,29 @@ def stator_places(case: xr.Dataset) -> list[tuple[float, ...]]:
     if not around:
         return []
     rig = rig_of(case)
-    is_set_about = rig.rotor.aligned_at is not None
-    up, across = assemble(rig).stators[around[0]].centre if is_set_about else (0.0, 0.0)
-    return [(s.angle, s.clearance_offset, across, up) for s in (rig.stator[i] for i in around)]
+    stators = [rig.stator[i] for i in around]
+    centres = [(0.0, 0.0)] * len(stators)
+    if rig.rotor.aligned_at is not None or any(stator.is_bore for stator in stators):
+        models = assemble(rig).stators
+        centres = [models[i].centre for i in around]
+    return [
+        (None if s.is_bore else s.angle, s.clearance_offset, across, up)
+        for s, (up, across) in zip(stators, centres, strict=True)
+    ]
+
+
+def bores_around(case: xr.Dataset) -> list[int]:
+    """Return which bores, by their place among the stators from 0, are around the node that is drawn."""
+    around = stators_around(case)
+    stators = rig_of(case).stator if around else ()
+    return [i for i in around if stators[i].is_bore]
 
 
 def unused_monitors(case: xr.Dataset) -> set[str]:
     """Return the measures that compare with what no part of the rig has; none where the rig is not known.
 
     These are a length and an Euler load, which beams have, the strength of a stator and the clearance of a
-    bearing.
+    bearing; and measures of bores.
     """
     if not table_of(case, "rig"):
         return set()
@@ -193,6 +208,7 @@ def unused_monitors(case: xr.Dataset) -> set[str]:
             bearing.clearance is not None for bearing in getattr(rig.rotor, "bearing", ())
         ),
     }
+    is_used |= dict.fromkeys(BORE_MEASURES, any(stator.is_bore for stator in rig.stator))
     return {name for name, used in is_used.items() if not used}
 
 

@@ -24,6 +24,7 @@ import click
     "--draws", type=click.IntRange(min=1), default=1000, show_default=True, help="Of the posterior."
 )
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True)
+@click.option("--slack", is_flag=True, help="Try slack bearings too, which takes several times as long.")
 @click.option(
     "--workers", type=click.IntRange(min=1), default=1, show_default=True, help="Processes of this machine."
 )
@@ -37,6 +38,7 @@ def identify(
     live: int,
     draws: int,
     seed: int,
+    slack: bool,
     workers: int,
     trust_rig: bool,
 ) -> int:
@@ -60,7 +62,7 @@ def identify(
             return 0
         found = identify_on(
             pool,
-            lambda: read_problem(measured, study, trust_rig=trust_rig),
+            lambda: read_problem(measured, study, slack=slack, trust_rig=trust_rig),
             output=folder,
             live=live,
             draws=draws,

@@ -12,7 +12,7 @@ from rubhpc.errors import InputError
 from rubhpc.fem.carrier import assemble_carrier
 from rubhpc.fem.model import MOST_DEGREES, Model, check_computable, computable
 from rubhpc.fem.rotor import assemble_rotor
-from rubhpc.fem.statics import at_rest_under, sag_at
+from rubhpc.fem.statics import at_rest_under, caught, sag_at
 from rubhpc.fem.stator import assemble_stator
 from rubhpc.rig.rotors import Load, Unbalance
 from rubhpc.rig.stators import Stator
@@ -46,6 +46,8 @@ def assemble(rig: Rig) -> Model:
         body = assemble_rotor(rig.rotor)
         constant, cosine, sine = forces_on(rig.rotor, body)
     check_computable("[rotor]", body)
+    if bores := {stator.node for stator in rig.stator if stator.is_bore}:
+        body = caught(body, bores)
     stators: list[StatorModel] = []
     n_degree = body.n_dof
     for number, stator in enumerate(rig.stator, 1):
@@ -101,7 +103,11 @@ def _set_about_the_shaft(
     except InputError as error:
         raise InputError(f"[rotor] clearance_from: {error}") from None
     sag, _ = at_rest_under(turning, load, spin)
-    return [replace(stator, centre=sag_at(turning, sag, stator.node)) for stator in stators]
+    placed = []
+    for stator in stators:
+        (v, w), (y, z) = sag_at(turning, sag, stator.node), stator.centre
+        placed.append(replace(stator, centre=(v + y, w + z)))
+    return placed
 
 
 def _on_carriers(rig: Rig, stators: list[StatorModel]) -> tuple[list[StatorModel], list[CarrierModel]]:

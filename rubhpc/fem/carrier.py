@@ -23,7 +23,7 @@ from scipy.linalg import block_diag
 from rubhpc.fem.beam import STATOR_DEGREES, join, stator_element
 from rubhpc.fem.model import Body, CarrierModel
 from rubhpc.rig.carriers import MOTIONS, Carrier
-from rubhpc.rig.stators import LumpedStator, Stator
+from rubhpc.rig.stators import Bore, LumpedStator, Stator
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -83,6 +83,13 @@ def _(stator: LumpedStator, model: StatorModel) -> Mounting:
     return Mounting(shape=shape, mass=block_diag(np.zeros((3, 3)), model.body.mass))
 
 
+@mount.register(Bore)
+def _(stator: Bore, model: StatorModel) -> Mounting:
+    """A hole whose springs stand on the carrier, or a rigid one, which is a part of it."""
+    n = model.body.n_dof
+    return Mounting(shape=followed(stator.angle, 0.0)[:n], mass=block_diag(np.zeros((3, 3)), model.body.mass))
+
+
 def assemble_carrier(
     carrier: AnyCarrier, stators: Sequence[tuple[int, AnyStator, StatorModel]]
 ) -> tuple[CarrierModel, list[StatorModel]]:
@@ -127,17 +134,12 @@ def assemble_carrier(
         degrees=tuple(degrees),
     )
     numbers = tuple(number for number, _, _ in stators)
-    placed = [
-        replace(
-            model,
-            body=body,
-            alone=model,
-            axial=of[model.axial],
-            lateral=of[model.lateral],
-            squared_slope=slope,
-        )
-        for of, slope, (_, _, model) in zip(rows, slopes, stators, strict=True)
-    ]
+    placed = []
+    for of, slope, (_, _, model) in zip(rows, slopes, stators, strict=True):
+        axial, lateral = (of[model.axial], of[model.lateral]) if of else (body.index(1, m) for m in "vw")
+        turn = body.index(1, "thx") if model.is_bore else -1
+        alone = replace(model, body=body, alone=model, squared_slope=slope)
+        placed.append(replace(alone, axial=axial, lateral=lateral, torsion=turn))
     return CarrierModel(name=carrier.name, body=body, stators=numbers), placed
 
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.rig.bearing_table import BearingTable
+    from rubhpc.rig.normal_law import NormalLaw
     from rubhpc.rig.probes import Probe
 
 
@@ -112,6 +113,8 @@ class Body:
         Which degree each row is. Rotor: "u", "v", "w", "thx", "thy", "thz"; stator: "axial"
         (positive outward, compressed), "lateral" (positive with the rim under positive spin), "rotation".
         User-supplied matrices may have others.
+    softness : float, 1/s2
+        Of a rotor that nothing holds laterally but bores: K has that much of M, in place of zero.
     """
 
     mass: NDArray[np.float64]
@@ -120,6 +123,7 @@ class Body:
     stiffness: NDArray[np.float64]
     degrees: tuple[tuple[int, str], ...]
     by_speed: SpeedDependence | None = None
+    softness: float = 0.0
 
     def at(self, spin: float) -> Body:
         """Return the body at a spin, rad/s: itself, where nothing depends on the speed.
@@ -198,8 +202,12 @@ class StatorModel:
     lateral: int  # row of the tip's lateral displacement; -1 without lateral freedom
     # (n_dof, n_dof), 1/m: the tip draws back by half the form of the displacements; None: not counted
     squared_slope: NDArray[np.float64] | None = None
-    centre: tuple[float, float] = (0.0, 0.0)  # m, about which it is set: v and w of the shaft there
+    centre: tuple[float, float] = (0.0, 0.0)  # m, about which it is set, up and horizontally
     strength: float = math.inf  # N, contact force that it bears
+    is_bore: bool = False  # a hole around the rotor, which moves up ("axial") and horizontally ("lateral")
+    friction_factor: float = 1.0  # friction over that of the case
+    law: NormalLaw | None = None  # in place of that of the case
+    torsion: int = -1  # row of its rotation about the shaft's axis, of a bore on a carrier that turns
     alone: StatorModel | None = None  # on a carrier: while that is held; `body` is all that stands on it
 
     @cached_property
@@ -333,6 +341,11 @@ class Model:
     def n_probe(self) -> int:
         """Number of probes and of what the monitors see beside them."""
         return 0 if self.probe is None else self.probe.constant.size
+
+    @property
+    def n_push(self) -> int:
+        """Number of stators whose contact forces are recorded as vectors: all, where one is a bore."""
+        return len(self.stators) * any(stator.is_bore for stator in self.stators)
 
     @property
     def probe_rows(self) -> NDArray[np.float64]:

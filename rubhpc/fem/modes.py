@@ -205,25 +205,46 @@ def _turns(degrees: list[tuple[int, str]]) -> bool:
     return bool(places["v"]) and places["v"] == places["w"] and places["thy"] == places["thz"]
 
 
-def _eigenpairs(
-    mass: NDArray[np.float64], damping: NDArray[np.float64], stiffness: NDArray[np.float64]
-) -> list[Pair]:
-    """Both eigenvalues (rad/s) of each mode, the slower first, and its shape.
+def modal_form(mass: Matrix, damping: Matrix, stiffness: Matrix) -> tuple[Matrix, Matrix, Matrix, Matrix]:
+    """Return the equations of motion in the undamped modes of the symmetric part of the stiffness.
 
-    The first-order form uses the undamped modes q of the symmetric part of K, with frequencies sigma, and the
-    states `y = sigma q` and `q'`. With N, the skew-symmetric part of K, it reads `y' = sigma q'` and
-    `q'' = -(sigma + N / sigma) y - C q'`. Without damping and N it is skew-symmetric, and its eigenvalues are
-    as accurate as the undamped ones, over four decades of frequency.
+    Returns
+    -------
+    basis : (n_dof, n_dof)
+        The modes as columns, `basis^T M basis = 1`.
+    sigma : (n_dof,)
+        Their frequencies, rad/s; 1 of a rigid-body mode.
+    stiffness, damping : (n_dof, n_dof)
+        `basis^T K basis` and `basis^T C basis`.
     """
-    n_mode = len(mass)
     symmetric = (stiffness + stiffness.T) / 2
     square, basis = undamped_modes(mass, symmetric)
     sigma = np.where(square == 0.0, 1.0, np.sqrt(np.abs(square)))
     stiff = np.diag(square) + basis.T @ (stiffness - symmetric) @ basis
-    damp = basis.T @ damping @ basis
-    state = np.block([[np.zeros((n_mode, n_mode)), np.diag(sigma)], [-stiff / sigma, -damp]])
+    return basis, sigma, stiff, basis.T @ damping @ basis
+
+
+def first_order(sigma: Matrix, stiffness: Matrix, damping: Matrix) -> Matrix:
+    """Return the state matrix (2 n, 2 n) of equations in their modal form, of states `y = sigma q` and `q'`.
+
+    With N, the skew-symmetric part of K, it reads `y' = sigma q'` and `q'' = -(sigma + N / sigma) y - C q'`.
+    Without damping and N it is skew-symmetric, and its eigenvalues are as accurate as the undamped ones, over
+    four decades of frequency.
+    """
+    n_mode = len(sigma)
+    state = np.block([[np.zeros((n_mode, n_mode)), np.diag(sigma)], [-stiffness / sigma, -damping]])
     if not np.isfinite(state).all():
         raise InputError(f"modes: {FAR_APART}")
+    return state
+
+
+def _eigenpairs(
+    mass: NDArray[np.float64], damping: NDArray[np.float64], stiffness: NDArray[np.float64]
+) -> list[Pair]:
+    """Both eigenvalues (rad/s) of each mode, the slower first, and its shape."""
+    basis, sigma, stiff, damp = modal_form(mass, damping, stiffness)
+    n_mode = len(mass)
+    state = first_order(sigma, stiff, damp)
     values, vectors = eig(state)
     if EPS * np.abs(values).max(initial=0.0) > _EXACT * np.abs(values).min(initial=np.inf):
         values, vectors = _refined(state, stiff, damp, sigma)

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.model import Body, Model
 
+PHASES = 3600  # of a revolution, at which an orbit in a bore is looked at: 4e-7 of its amplitude
 SMALL = 256  # degrees of a rotor whose frequencies are kept for other speeds and stators: 1 MB
 
 
@@ -131,13 +132,17 @@ def contact_free_reach(model: Model, spin: float) -> float:
         rad/s.
     """
     response = steady_response(model, spin)
-    nearer, _ = sag_at_stators(model)
+    nearer, aside = sag_at_stators(model)
     reach = -math.inf
-    for stator, sag in zip(model.stators, nearer, strict=True):
+    for stator, sag, off in zip(model.stators, nearer, aside, strict=True):
         rows = [model.rotor.index(stator.node, name) for name in ("v", "w")]
         v, w = (response[row] if row >= 0 else 0.0 for row in rows)
-        towards = abs(v * math.cos(stator.angle) + w * math.sin(stator.angle))
-        reach = max(reach, float(towards + sag) - stator.clearance_offset)
+        if stator.is_bore:
+            turn = np.exp(2j * np.pi * np.arange(PHASES) / PHASES)
+            away = np.abs((v * turn).real + sag + 1j * ((w * turn).real - off)).max()
+        else:
+            away = abs(v * math.cos(stator.angle) + w * math.sin(stator.angle)) + sag
+        reach = max(reach, float(away) - stator.clearance_offset)
     return reach
 
 

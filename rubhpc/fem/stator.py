@@ -1,4 +1,4 @@
-"""Assembly of a stator: a cantilever, a mass on springs or a wall, or its matrices."""
+"""Assembly of a stator: a cantilever, a mass on springs or a wall, its matrices, or a bore."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from rubhpc.fem.beam import STATOR_DEGREES, join, rayleigh_coefficients, stator_element, stator_foreshortening
 from rubhpc.fem.model import Body, StatorModel
-from rubhpc.rig.stators import LumpedStator, MatrixStator, Stator
+from rubhpc.rig.stators import Bore, LumpedStator, MatrixStator, Stator
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -26,7 +26,7 @@ def assemble_stator(stator: object, radius: float) -> StatorModel:
 
     Parameters
     ----------
-    stator : Stator, LumpedStator or MatrixStator
+    stator : Stator, LumpedStator, MatrixStator or Bore
     radius : float
         Contact radius, m.
     """
@@ -78,6 +78,15 @@ def _(stator: LumpedStator, radius: float) -> StatorModel:
     return _model(stator, radius, (M, C, K), tuple((1, name) for name in names))
 
 
+@assemble_stator.register(Bore)
+def _(stator: Bore, radius: float) -> StatorModel:
+    """A hole whose centre moves up, "axial", and horizontally, "lateral"; a rigid one has no degrees."""
+    n = 0 if stator.rigid else 2
+    table = np.array([(stator.mass,) * 2, stator.dampers, stator.springs][: 3 if n else 0], dtype=np.float64)
+    M, C, K = (np.diag(row) for row in table.reshape(3, n))
+    return _model(stator, radius, (M, C, K), ((1, "axial"), (1, "lateral"))[:n], centre=stator.centre)
+
+
 def _model(
     seat: Seat,
     radius: float,
@@ -89,6 +98,7 @@ def _model(
     length: float = math.inf,
     euler_load: float = math.inf,
     squared_slope: Matrix | None = None,
+    centre: tuple[float, ...] = (0.0, 0.0),
 ) -> StatorModel:
     """Return a stator by its mass, damping and stiffness; without a length nothing depends on it."""
     mass, damping, stiffness = matrices
@@ -111,4 +121,8 @@ def _model(
         axial=body.index(tip, "axial"),
         lateral=body.index(tip, "lateral"),
         squared_slope=squared_slope,
+        centre=(centre[0], centre[1]),
+        is_bore=seat.is_bore,
+        friction_factor=seat.friction_factor,
+        law=seat.law,
     )

@@ -73,6 +73,7 @@ def identify(
     live: int = LIVE,
     draws: int = DRAWS,
     seed: int = 1,
+    slack: bool = False,
     workers: int = 1,
     trust_rig: bool = False,
     report: Callable[[str], None] = lambda text: None,
@@ -95,6 +96,8 @@ def identify(
     draws : int
         Draws of the posterior.
     seed : int
+    slack : bool
+        Whether slack bearings are tried too, which takes several times as long.
     workers : int
         Processes that share the cases; the result is the same for any number.
     trust_rig : bool
@@ -114,7 +117,7 @@ def identify(
     with nullcontext(Pool()) if workers == 1 else start_workers(workers, take_part) as pool:
         return identify_on(
             pool,
-            lambda: read_problem(measured, study, trust_rig=trust_rig),
+            lambda: read_problem(measured, study, slack=slack, trust_rig=trust_rig),
             output=output,
             live=live,
             draws=draws,

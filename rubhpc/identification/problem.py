@@ -20,6 +20,7 @@ from rubhpc.identification.comparison import Comparison, period_of_lines
 from rubhpc.identification.lines import LineComparison
 from rubhpc.identification.powers import PowerComparison
 from rubhpc.identification.priors import is_prior, read_prior
+from rubhpc.identification.slack import slack_bearings
 from rubhpc.input.messages import place
 from rubhpc.input.reading import read_toml
 from rubhpc.rig.reading import read_rig
@@ -132,7 +133,11 @@ def read_known(study: str | PathLike[str], *, trust_rig: bool = False) -> Known:
 
 
 def read_problem(
-    file: str | PathLike[str] | xr.Dataset, study: str | PathLike[str], *, trust_rig: bool = False
+    file: str | PathLike[str] | xr.Dataset,
+    study: str | PathLike[str],
+    *,
+    slack: bool = False,
+    trust_rig: bool = False,
 ) -> Problem:
     """Return the problem of a measured file and a study file.
 
@@ -143,6 +148,10 @@ def read_problem(
     study : path
         A study whose entries in [grid] are priors. Without a speed it is that of the measurement. The record
         is by default as long as that of the measurement, up to 60 revolutions, after a direct transient.
+    slack : bool
+        Whether slack bearings are tried too.
+    trust_rig : bool
+        Whether a rig that is Python code may be run.
 
     Raises
     ------
@@ -179,7 +188,7 @@ def read_problem(
         machine=machine,
         comparison=comparison,
         rub=rub,
-        others=others,
+        others=(*others, *(slack_bearings(machine, comparison) if slack else ())),
         note=str(data.attrs.get("note", "")),
     )
 

@@ -259,6 +259,8 @@ def _spelled(text: str) -> object:
 
 
 def _encode_quantity(value: float | str) -> float | str:
+    if isinstance(value, WithUnit):
+        return f"{float(value)!r} {value.unit}"
     return value if isinstance(value, str) else float(value)
 
 

@@ -144,9 +144,11 @@ def _parse(declared: dataclasses.Field[Any], hint: Any, value: object, file: str
 def _kind_of(hint: Any, table: object) -> Any:
     """Return the dataclass of a union that a table describes.
 
-    The one with most of its keys; of several the one that lacks the fewest required ones, or the first.
+    The one whose `KIND` its key `kind` names; else the one with most of its keys; of several the one that
+    lacks the fewest required ones, or the first.
     """
     keys = set(table) if isinstance(table, dict) else set()
+    named = table.get("kind") if isinstance(table, dict) else None
 
     def likeness(kind: Any) -> tuple[int, int]:
         declared = dataclasses.fields(kind)
@@ -154,6 +156,7 @@ def _kind_of(hint: Any, table: object) -> Any:
         return len(keys & {key_of(f) for f in declared}), -len(required - keys)
 
     kinds = [kind for kind in get_args(hint) or (hint,) if kind is not type(None)]  # None: it may be left out
+    kinds = [kind for kind in kinds if named and getattr(kind, "KIND", None) == named] or kinds
     return max(kinds, key=likeness)
 
 

@@ -30,6 +30,7 @@ from rubhpc.integrate.measuring.measures import measures_of
 from rubhpc.integrate.measuring.monitors import carrier_displacement, monitored
 from rubhpc.integrate.measuring.orbit_measures import period
 from rubhpc.integrate.measuring.regimes import LASTING, LEAST_REVOLUTIONS, by_growth, regime
+from rubhpc.integrate.measuring.rub_in_bores import rub_measures
 from rubhpc.integrate.measuring.samples import (
     add_sag,
     by_name,
@@ -46,12 +47,13 @@ from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.periodic_motions.proof import Solver
 from rubhpc.integrate.periodic_motions.solved_motion import SolvedMotion, solved_motions
 from rubhpc.integrate.record import Record, State
+from rubhpc.integrate.releases import Through, record_through
 from rubhpc.integrate.scheme import Scheme
 from rubhpc.integrate.start import fit_to_gaps, start_of
 from rubhpc.integrate.tangent_motion import TangentMotion
 from rubhpc.integrate.transient import pass_revolutions, pass_transient
 from rubhpc.kernels.trail import BROKEN
-from rubhpc.schema import DONE, REGIME, SECTION_NAMES, lyapunov_variables
+from rubhpc.schema import DONE, REGIME, SECTION_NAMES, bore_variables, lyapunov_variables
 from rubhpc.spectra import amplitude_spectrum
 from rubhpc.study.initial import Initial
 
@@ -119,8 +121,8 @@ def run_case(
     else:
         state = start_of(initial or Initial(), setup, clearance)
 
-    def starter(scheme: Scheme) -> Callable[[State], March]:
-        def start(state: State) -> March:
+    def starter(scheme: Scheme) -> Callable[..., March]:
+        def start(state: State, setup: Setup = setup) -> March:
             def look() -> None:
                 assert check is not None
                 revolution = march.sample / setup.samples_per_revolution
@@ -192,7 +194,7 @@ def compile_kernels(
 
 
 def _integrate(
-    start: Callable[[State], March],
+    start: Callable[..., March],
     initial: State,
     setup: Setup,
     clearance: float,
@@ -217,6 +219,7 @@ def _integrate(
         reason, n_transient = pass_transient(march, recording)
     marched: Marched | None = None
     trail: Trail | None = None
+    through: Through | None = None
     n_step_before, n_left_before = n_step, march.n_left
     if reason is not None:  # the record shows the way to divergence
         n_step, n_left = n_step + march.n_step, march.n_left
@@ -231,13 +234,21 @@ def _integrate(
         motion = motion if marched is not None else None
     if marched is None:
         trail = trail_of(march, recording)
-        marched = march_record(march, setup, recording.revolutions)
+        if isinstance(setup, ModalSetup) and setup.release is not None:
+            through = record_through(march, setup, recording.revolutions, start)
+            marched, march, n_step = through.marched, through.march, n_step + through.n_step
+        else:
+            marched = march_record(march, setup, recording.revolutions)
         reason = marched.reason
     n_step, n_left = n_step + march.n_step, n_left + march.n_left
     samples, accumulator, final = marched.samples, marched.accumulator, marched.final
-    add_sag(samples, accumulator, setup.model)
+    last_setup, n_before = setup, 0
+    if through is None:
+        add_sag(samples, accumulator, setup.model)
+    else:
+        last_setup, n_before = through.setup, through.n_sample
     if reason is not None:
-        n_kept = samples_within(samples, march.sample, setup.displacement_limit)
+        n_kept = samples_within(samples, n_before + march.sample, setup.displacement_limit)
         revolution = n_transient + min(n_kept // per_revolution + 1, recording.revolutions)
         record = diverged_record(
             f"{reason} in revolution {revolution}",
@@ -246,11 +257,22 @@ def _integrate(
             settings,
             final,
             by_name(samples.whole[:, :n_kept], setup.model),
+            has_bore=setup.model.n_push > 0,
         )
     else:
         signals = by_name(samples.whole, setup.model)
+        turn = 2.0 * math.pi / abs(setup.spin)
         judge = (
-            judge_of(march, start, setup, clearance, friction, recording, final, trail)
+            judge_of(
+                march,
+                partial(start, setup=last_setup),
+                last_setup,
+                clearance,
+                friction,
+                recording,
+                final,
+                trail,
+            )
             if motion is None
             else motion.judge
         )
@@ -273,7 +295,8 @@ def _integrate(
             )
             | monitored(samples, accumulator, setup.model, is_round=setup.is_updated)
             | {"carrier_displacement": carrier_displacement(samples, setup.model)}
-            | probe_extents(signals),
+            | probe_extents(signals)
+            | rub_measures(samples.push, accumulator, recording.revolutions * turn, setup.model),
             settings=settings,
             final=final,
             probed=recording.probed,
@@ -298,7 +321,8 @@ def _counted(record: Record, n_transient: int, n_step: int, n_left: int) -> Reco
 def _spectra(samples: Samples, model: Model) -> dict[str, Floats]:
     """Spectra of all signals, by their names in the schema."""
     spectra = by_name(amplitude_spectrum(samples.whole), model)
-    return {f"spectrum_{name}": spectrum for name, spectrum in spectra.items()}
+    unasked = bore_variables()
+    return {f"spectrum_{name}": spectrum for name, spectrum in spectra.items() if name not in unasked}
 
 
 def exponents_of(

@@ -27,7 +27,10 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-_SUMMED = ("n_contact", "contact_time", "impulse", "stick_time", "friction_work", "energy", "reversals")
+_SUMMED = (
+    *("n_contact", "contact_time", "impulse", "stick_time", "friction_work", "energy", "reversals"),
+    "turned",
+)
 _LARGEST = ("highest", "peak_force", "peak_lateral", "pivots", "residual")
 _EXTREMA = dict.fromkeys(_LARGEST, np.maximum) | dict.fromkeys(("lowest", "least_slip"), np.minimum)
 
@@ -47,7 +50,7 @@ def march_record(
 ) -> Marched:
     """Record so many revolutions from where a march stands; a given accumulator follows another record."""
     model, n_sample = setup.model, n_revolution * setup.samples_per_revolution
-    samples = empty_samples(march.n_place, n_sample, model.n_probe)
+    samples = empty_samples(march.n_place, n_sample, model.n_probe, model.n_push)
     sums = accumulator or new_accumulator(len(model.stators), march.n_place)
     before = march.energy()
     sums.is_touching[:] = march.touching()  # a contact under way did not begin in the record
@@ -67,7 +70,7 @@ class Part(NamedTuple):
 def repeated_samples(parts: Sequence[Part], n_sample: int, model: Model) -> Samples:
     """Return the samples of a period over and over, up to `n_sample`."""
     period = np.concatenate([part.samples.whole for part in parts], axis=1)
-    samples = empty_samples(model.n_place, n_sample, model.n_probe)
+    samples = empty_samples(model.n_place, n_sample, model.n_probe, model.n_push)
     for first in range(0, n_sample, period.shape[1]):
         room = samples.whole[:, first : first + period.shape[1]]
         room[:] = period[:, : room.shape[1]]
@@ -161,7 +164,7 @@ def _note_peak_at_return(
         return
     n_sample = math.ceil(AVERAGING_TIME / setup.interval)
     follows = following_accumulator(ended, passed)
-    samples = empty_samples(march.n_place, n_sample, setup.model.n_probe)
+    samples = empty_samples(march.n_place, n_sample, setup.model.n_probe, setup.model.n_push)
     march.advance(0, n_sample, samples, follows, is_recorded=True)
     np.maximum(ended.peak_force, follows.peak_force, out=ended.peak_force)
 

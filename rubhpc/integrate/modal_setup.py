@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -45,6 +45,13 @@ LONGEST_TURN = FINEST_TICK * 2**46  # s, 3.7 hours: 64 bits count the ticks of a
 FEWEST_STEPS = 16  # per revolution, at least
 
 
+class Release(NamedTuple):
+    """What goes on where bearings let go of the shaft."""
+
+    after: int  # revolutions of the record
+    setup: ModalSetup
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ModalSetup:
     """Set-up that the cases of one rig and speed share; contact modes are solved when first met."""
@@ -60,6 +67,7 @@ class ModalSetup:
     law: Law = MULTIPLIER
     accuracy: float = 1e-3  # relative, of the modes kept, and of loads where gaps are curved
     free_spin: FreeSpin | None = None  # of a driven rotor
+    release: Release | None = None
     is_measured: bool = True  # False: tables have no outputs and energies
     _libraries: dict[float, ModeLibrary] = field(default_factory=dict)
 

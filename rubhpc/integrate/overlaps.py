@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rubhpc.integrate.packing import degrees_of
-from rubhpc.kernels.contact_pairs import AXIAL, V, W, normal_and_gap
+from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, V, W, normal_and_gap
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -40,6 +41,13 @@ def gaps(displacement: Floats, setup: Setup, clearance: float) -> tuple[Floats, 
             at[AXIAL] += 0.5 * displacement[body] @ drawn
         ey, ez = float(np.cos(stator.angle)), float(np.sin(stator.angle))
         reach = clearance + stator.clearance_offset
+        if stator.is_bore:
+            y, z = at[V] - at[AXIAL], at[W] - at[LATERAL]
+            away = math.hypot(y, z)
+            ny, nz = (y / away, z / away) if away > 0.0 else (1.0, 0.0)
+            gap[i], change = reach - away, np.array([-ny, -nz, 0.0, ny, nz])
+            gap_jacobian[i, rows[rows >= 0]] = change[rows >= 0]
+            continue
         ny, nz, gap[i] = normal_and_gap(ey, ez, stator.radius, reach, 0.0, setup.is_updated, at)
         change = np.array([-ny, -nz, 0.0, ny * ey + nz * ez, ny * -ez + nz * ey])
         gap_jacobian[i, rows[rows >= 0]] = change[rows >= 0]

@@ -177,6 +177,21 @@ def law_of(contact: Contact) -> Law:
     return Law(friction_law=friction, normal_law=normal, **values)
 
 
+def normal_laws(model: Model, law: Law) -> dict[str, Any]:
+    """Contact law of each stator, (q,) each: its own, or that of the case (N/m, N s/m, or those of Hertz)."""
+    found: list[tuple[float, ...]] = []
+    for stator in model.stators:
+        own = stator.law
+        if own is None:
+            found.append((law.normal_law, law.stiffness, law.damping, law.restitution))
+        else:
+            given = (own.stiffness, own.damping, own.restitution)
+            found.append((NORMAL_LAWS.index(own.kind), *(value or 0.0 for value in given)))
+    names = ("normal_law", "stiffness", "damping", "restitution")
+    columns = dict(zip(names, np.array(found, dtype=np.float64).T.copy(), strict=True))
+    return columns | {"normal_law": columns["normal_law"].astype(np.int64)}
+
+
 def pairs_of(
     model: Model,
     *,

@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rubhpc.schema import DONE, SCHEMES, STATUS, VARIABLES, lyapunov_variables, probe_variables
+from rubhpc.schema import (
+    DONE,
+    SCHEMES,
+    STATUS,
+    VARIABLES,
+    bore_variables,
+    lyapunov_variables,
+    probe_variables,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -253,7 +261,9 @@ class Record(RecordVariables):
         import xarray as xr
 
         arrays = {**self.signals, **self.spectra, **self.sections, **self.measures, **self.settings}
-        variables = VARIABLES | probe_variables(self.probed) | lyapunov_variables(self.n_exponent)
+        variables = (
+            VARIABLES | bore_variables() | probe_variables(self.probed) | lyapunov_variables(self.n_exponent)
+        )
         dataset = xr.Dataset(
             {
                 name: (

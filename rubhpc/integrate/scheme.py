@@ -10,6 +10,9 @@ from rubhpc.schema import SCHEMES
 from rubhpc.study.tables import check_method
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rubhpc.rig.stators import AnyStator
     from rubhpc.study.study import Contact, Integrator
 
 
@@ -27,7 +30,12 @@ class Scheme(Enum):
 
 
 def scheme_of(
-    contact: Contact, integrator: Integrator, *, is_bent: bool = False, is_updated: bool = False
+    contact: Contact,
+    integrator: Integrator,
+    *,
+    is_bent: bool = False,
+    is_updated: bool = False,
+    stators: Sequence[AnyStator] = (),
 ) -> Scheme:
     """Return the initial scheme of a case.
 
@@ -37,14 +45,17 @@ def scheme_of(
         Whether a stator has second-order geometry.
     is_updated : bool
         Whether a normal turns.
+    stators : sequence
+        Of the rig.
 
     Raises
     ------
     InputError
         For an integrator that knows no such stator or law.
     """
-    check_method(contact, integrator, is_bent=is_bent)
+    check_method(contact, integrator, is_bent=is_bent, stators=stators)
     if integrator.method == "central-difference":
         return Scheme.CENTRAL_DIFFERENCE
-    is_general = is_bent or is_updated or not contact.are_laws_closed
+    is_own = any(stator.has_own_contact for stator in stators)
+    is_general = is_bent or is_updated or is_own or not contact.are_laws_closed
     return Scheme.COLLOCATION if is_general else Scheme.EVENT_DRIVEN

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, TypeAlias
 
@@ -16,7 +16,7 @@ from rubhpc.fem.probes import with_probes
 from rubhpc.fem.response import step_limit
 from rubhpc.fem.statics import sag_at_stators
 from rubhpc.integrate.measuring.divergence import energy_limit
-from rubhpc.integrate.modal_setup import FINEST_TICK, LONGEST_TURN, ModalSetup
+from rubhpc.integrate.modal_setup import FINEST_TICK, LONGEST_TURN, ModalSetup, Release
 from rubhpc.integrate.packing import Packed, degrees_of, law_of, pack
 from rubhpc.integrate.reduced_model.reduction import reduce_model
 from rubhpc.integrate.reduced_model.truncation import touch_of
@@ -24,10 +24,13 @@ from rubhpc.integrate.scheme import Scheme, scheme_of
 from rubhpc.kernels.central_difference import Stepper
 from rubhpc.kernels.contact_pairs import LATERAL, V, W
 from rubhpc.kernels.laws import MULTIPLIER
+from rubhpc.rig.rotors import Rotor
 from rubhpc.study.tables import SEARCH_STEP
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
@@ -36,6 +39,8 @@ if TYPE_CHECKING:
     from rubhpc.rig.rig import Rig
     from rubhpc.study.drive_law import DriveLaw
     from rubhpc.study.study import Contact, Integrator
+
+    Floats = NDArray[np.float64]
 
 
 ACROSS = 1e-12  # share of a motion across the axis of a stator that is rounding
@@ -116,6 +121,15 @@ def prepare_steps(
 Setup: TypeAlias = CentralDifferenceSetup | ModalSetup
 
 
+def reduced_sag(model: Model, reduced: ReducedModel) -> Floats:
+    """Sag (n_dof,), m, of a rotor of little stiffness: in reduced coordinates, whose stiffness holds it."""
+    n = model.rotor.n_dof
+    basis, project = reduced.basis[:n], reduced.project[:, :n]
+    rests = np.linalg.solve(reduced.stiffness, basis.T @ model.load)
+    sag: Floats = model.sag + basis @ (rests - project @ model.sag)
+    return sag
+
+
 def moves_across(model: Model) -> bool:
     """Whether a stator's tip and disc can move across its axis, so that their line of centres turns."""
     aside = np.abs(sag_at_stators(model)[1])
@@ -159,10 +173,12 @@ def prepare(
     model, free_spin = model or assemble(rig), None
     if drive is not None:
         model, free_spin = release(model, drive.inertia)
-    model = with_probes(model_at(model, speed), rig, probes, speed)
+    bare = model_at(model, speed)
+    model = with_probes(bare, rig, probes, speed)
     is_bent = any(stator.squared_slope is not None for stator in model.stators)
-    is_updated = contact.normal == "updated" and moves_across(model)
-    scheme = scheme_of(contact, integrator, is_bent=is_bent, is_updated=is_updated)
+    has_bore = any(stator.is_bore for stator in model.stators)
+    is_updated = contact.normal == "updated" and (has_bore or moves_across(model))
+    scheme = scheme_of(contact, integrator, is_bent=is_bent, is_updated=is_updated, stators=rig.stator)
     if integrator.method == "modal":
         if 2.0 * math.pi / abs(speed) > LONGEST_TURN:
             least = 2.0 * math.pi / LONGEST_TURN
@@ -172,10 +188,32 @@ def prepare(
             )
         law = law_of(contact)
         touch = touch_of(model, law, is_updated=is_updated)
+        reduced = reduced or reduce_model(model, speed, integrator.accuracy, free_spin, touch=touch)
+        limit, later = rig.rotor.displacement_limit, None
+        if model.rotor.softness:
+            model = with_probes(replace(bare, sag=reduced_sag(model, reduced)), rig, probes, speed)
+            limit += float(np.abs(model.sag).max())
+        if isinstance(rig.rotor, Rotor) and rig.rotor.let_go_at(speed) < math.inf:
+            after = replace(rig, rotor=rig.rotor.let_go(speed))
+            alone = assemble(after)  # stators stay where they are set about the shaft before
+            caught = prepare(
+                after,
+                speed,
+                contact=contact,
+                integrator=integrator,
+                samples_per_revolution=samples_per_revolution,
+                model=replace(alone, stators=bare.stators, carriers=bare.carriers),
+                probes=probes,
+                drive=drive,
+                is_measured=is_measured,
+            )
+            assert isinstance(caught, ModalSetup)
+            later = Release(int(rig.rotor.let_go_at(speed)), caught)
         return ModalSetup(
             scheme=scheme,
             model=model,
-            reduced=reduced or reduce_model(model, speed, integrator.accuracy, free_spin, touch=touch),
+            reduced=reduced,
+            release=later,
             is_measured=is_measured,
             free_spin=free_spin,
             spin=speed,
@@ -184,7 +222,7 @@ def prepare(
             samples_per_revolution=samples_per_revolution,
             is_updated=is_updated,
             law=law,
-            displacement_limit=rig.rotor.displacement_limit,
+            displacement_limit=limit,
         )
     return prepare_steps(
         model,

@@ -16,6 +16,7 @@ from rubhpc.fem.stability import instability_message
 from rubhpc.fem.statics import rigid_body_row
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.overlaps import gaps, with_overlap
+from rubhpc.integrate.packing import normal_laws
 from rubhpc.integrate.record import State
 from rubhpc.kernels.complementarity import UNSOLVED
 from rubhpc.kernels.laws import HERTZ
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.model import Model
     from rubhpc.integrate.setup import Setup
-    from rubhpc.kernels.laws import Law
     from rubhpc.study.initial import Initial
 
     Floats = NDArray[np.float64]
@@ -80,7 +80,7 @@ def _fitted(state: State, setup: Setup, clearance: float, *, is_soft: bool = Fal
             force = _least_forces(compliance, gap + allowed + gap_jacobian @ (begin - displacement))
             displacement = begin + shape @ force
             before = gap_jacobian
-            softness = compression(setup.law, force) if is_soft else softness
+            softness = compression(setup, force) if is_soft else softness
             gap, gap_jacobian = gaps(displacement, setup, clearance)
             excess = gap + allowed + softness * force
             is_turned = np.abs((gap_jacobian - before).T @ force).max() > TURNED * force.max()
@@ -109,8 +109,8 @@ def at_rest(setup: Setup, clearance: float) -> State:
     if not np.any(gap < 0.0):
         return state
     state = replace(state, contact_force=np.full(gap.size, LEAST_FORCE))  # some may be pushed onto others
-    spring = setup.law.stiffness
-    state, is_found = _fitted(state, setup, clearance, is_soft=spring > 0.0)
+    is_soft = bool(np.any(normal_laws(setup.model, setup.law)["stiffness"] > 0.0))
+    state, is_found = _fitted(state, setup, clearance, is_soft=is_soft)
     force = state.contact_force
     state = replace(state, contact_force=np.where(force > LEAST_FORCE, force, 0.0))
     is_held = isinstance(setup, ModalSetup) or not state.contact_force.any()  # the former takes no others
@@ -122,16 +122,18 @@ def at_rest(setup: Setup, clearance: float) -> State:
             "initial: the shaft finds no rest on the stators that it reaches; constrain them, or set "
             'from = "contact_free"'
         )
-    return with_overlap(state, setup, clearance) if spring else state
+    return with_overlap(state, setup, clearance) if is_soft else state
 
 
-def compression(law: Law, force: Floats) -> Floats:
-    """Compression of the springs of a law under forces (q,), over these, m/N."""
-    if law.normal_law == HERTZ:
-        return np.where(
-            force > 0.0, law.stiffness ** (-2 / 3) * np.maximum(force, LEAST_FORCE) ** (-1 / 3), 0.0
-        )
-    return np.full(force.size, 1.0 / law.stiffness)
+def compression(setup: Setup, force: Floats) -> Floats:
+    """Compression of the springs of the laws under forces (q,), over these, m/N; none of multipliers."""
+    laws = normal_laws(setup.model, setup.law)
+    stiffness = np.where(laws["stiffness"] > 0.0, laws["stiffness"], np.inf)
+    of_hertz = stiffness ** (-2 / 3) * np.maximum(force, LEAST_FORCE) ** (-1 / 3)
+    found: Floats = np.where(
+        laws["normal_law"] == HERTZ, np.where(force > 0.0, of_hertz, 0.0), 1.0 / stiffness
+    )
+    return found
 
 
 def _as_seen(displacement: Floats, setup: Setup) -> Floats:

@@ -25,7 +25,10 @@ class Samples(Struct):
     lateral: Floats  # (q, n_sample), m
     force: Floats  # (q, n_sample), N
     probe: Floats  # (n_probe, n_sample), each in its own unit
-    whole: Floats  # (4 + 3 q + n_probe, n_sample), the arrays above as rows, in this order
+    # (q, 4, n_sample), N, vectors up and horizontally: normal force on the stator, all of the force on it; or
+    # (0, 4, n_sample), where no stator is a bore
+    push: Floats
+    whole: Floats  # (n, n_sample), the arrays above as rows, in this order
 
 
 class Accumulator(Struct):
@@ -42,6 +45,7 @@ class Accumulator(Struct):
     reversals: Ints  # (q,), changes of that sense
     friction_work: Floats  # (q,), J
     least_slip: Floats  # (q,), m/s
+    turned: Floats  # (q,), rad, of the contact point in a bore while it touches, positive forward
     peak_force: Floats  # (q,), N, largest mean over the averaging time: see `force_average`
     force_piece: Floats  # (q, 7, n), pieces of the force within the averaging time
     force_held: Ints  # (q, 2), oldest piece and number of pieces

@@ -195,6 +195,7 @@ def row_of(sums: Accumulator, i: int) -> Accumulator:
         sums.reversals[i],
         sums.friction_work[i],
         sums.least_slip[i],
+        sums.turned[i],
         sums.peak_force[i],
         sums.force_piece[i],
         sums.force_held[i],

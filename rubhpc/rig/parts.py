@@ -7,7 +7,7 @@ when some are set.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 from rubhpc.input.fields import FieldError, check_fields, count, flag, pairs, quantity
@@ -248,6 +248,12 @@ class Bearing(Springs, Support):
 
     Its mass, like its springs and dampers, acts on the motion of the shaft relative to what it stands on.
     """
+
+
+def let_go(support: Support) -> Bearing:
+    """Return what is left of a bearing that lets go of the shaft: its place and its masses."""
+    kept = {f.name: getattr(support, f.name) for f in fields(Support) if f.name != "until"}
+    return Bearing(stiffness=0.0, damping=0.0, **kept)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -76,6 +76,10 @@ class Rig:
                 fix = f"add it, or add the diameter of a disc at node {stator.node}"
                 raise FieldError(f"stator.{i}.radius", f"missing, and no disc there has a diameter; {fix}")
         check_carriers(self.carrier, self.stator)
+        for i, bearing in enumerate(getattr(self.rotor, "bearing", ()), 1):
+            if bearing.until is not None and not any(stator.is_bore for stator in self.stator):
+                problem = "no bore would catch the rotor"
+                raise FieldError(f"rotor.bearing.{i}.until", f'{problem}; add [[stator]] kind = "bore"')
 
     @classmethod
     def from_matrices(

@@ -6,7 +6,7 @@ Every kind of rotor has the forces of `RotorForces`, a `displacement_limit` and 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -27,6 +27,7 @@ from rubhpc.rig.parts import (
     ShaftSection,
     Sleeve,
     Torsion,
+    let_go,
 )
 from rubhpc.rig.supports import Placed
 
@@ -184,6 +185,16 @@ class Rotor(RotorForces):
                 found[number].append((node, pedestal))
                 pedestal = pedestal.pedestal
         return found
+
+    def let_go_at(self, spin: float) -> float:
+        """Whole revolutions after which the first bearing lets go at a spin, rad/s; infinite: none does."""
+        return min(bearing.let_go_at(spin) for bearing in self.bearing)
+
+    def let_go(self, spin: float) -> Rotor:
+        """Return the rotor without the bearings that let go first."""
+        first = self.let_go_at(spin)
+        bearing = tuple(let_go(b) if b.let_go_at(spin) == first else b for b in self.bearing)
+        return replace(self, bearing=bearing)
 
     @property
     def displacement_limit(self) -> float:

@@ -1,10 +1,10 @@
-"""Stators: a cantilever beam, a mass on springs or a rigid wall, or user-supplied matrices."""
+"""Stators: a cantilever, a mass on springs or a wall, user-supplied matrices, or a round bore."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np  # noqa: TC002 - annotations are read when a rig is built
 from numpy.typing import NDArray  # noqa: TC002
@@ -17,22 +17,33 @@ from rubhpc.input.fields import (
     flag,
     matrix,
     quantity,
+    series,
     table,
     text,
     words,
 )
 from rubhpc.models import LINEAR, SECOND_ORDER, default_of
 from rubhpc.rig.matrix_body import check_body, checked_matrices
+from rubhpc.rig.normal_law import NormalLaw  # noqa: TC001 - annotations are read when a rig is built
 from rubhpc.rig.parts import MOST_ELEMENTS, UNDAMPED, Damping
 from rubhpc.units import typed_quantity
 
 MOST_STATORS = 62  # a contact mode is numbered by the bits of an integer
+KINDS = {"beam": "Stator", "lumped": "LumpedStator", "matrix": "MatrixStator", "bore": "Bore"}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Seat:
     """Position of a stator, or of a ring of `count` stators, the first one at `angle`."""
 
+    KIND: ClassVar[str] = ""
+
+    kind: str | None = choice(
+        doc="What the stator is; by default what its other keys say. A bore needs it.",
+        example='"bore"',
+        of=tuple(KINDS),
+        default=None,
+    )
     node: int = count(doc="Node of the rotor that the stator faces, from 1.", example="8")
     angle: float = quantity(
         "rad", doc="Angle from straight up (+y) towards +z.", example='"90 deg"', default=0.0
@@ -66,9 +77,34 @@ class Seat:
         at_most=MOST_STATORS,
         is_key=False,
     )
+    friction_factor: float = quantity(
+        "",
+        doc="Friction of this stator over that of the case.",
+        example="0.5",
+        default=1.0,
+        at_least=0,
+        added=True,
+    )
+    law: NormalLaw | None = table(
+        doc="Contact law of this stator; by default that of the study.", default=None, added=True
+    )
 
     def __post_init__(self) -> None:
         check_fields(self)
+        if self.kind not in (None, self.KIND):
+            assert self.kind is not None
+            raise FieldError("kind", f'"{self.kind}" is another stator; use rubhpc.{KINDS[self.kind]}')
+        object.__setattr__(self, "kind", None)  # what its keys say
+
+    @property
+    def is_bore(self) -> bool:
+        """Whether it is a hole around the rotor."""
+        return self.KIND == "bore"
+
+    @property
+    def has_own_contact(self) -> bool:
+        """Whether its gap, law or friction differs from that of the case's other stators."""
+        return self.is_bore or self.law is not None or self.friction_factor != 1.0
 
     @property
     def carrier_problem(self) -> str:
@@ -79,6 +115,8 @@ class Seat:
 @dataclass(frozen=True, kw_only=True)
 class Stator(Seat):
     """A radial cantilever whose free end faces the rotor."""
+
+    KIND = "beam"
 
     length: float = quantity(
         "m", doc="Length of the cantilever, in the radial direction.", example='"40 mm"', above=0
@@ -178,6 +216,8 @@ class Stator(Seat):
 class LumpedStator(Seat):
     """A mass on a radial and, with a lateral stiffness, a tangential spring and damper; or a rigid wall."""
 
+    KIND = "lumped"
+
     mass: float | None = quantity(
         "kg", doc="Mass in the radial direction.", example='"0.5 g"', default=None, above=0
     )
@@ -241,6 +281,8 @@ class MatrixStator(Seat):
     that along the rim under positive spin. Other degrees have any names.
     """
 
+    KIND = "matrix"
+
     mass: NDArray[np.float64] = matrix(
         doc="Mass matrix, symmetric and positive definite, SI units.", example="[[5e-4, 0.0], [0.0, 5e-4]]"
     )
@@ -269,7 +311,115 @@ class MatrixStator(Seat):
         return "matrices hold it to the ground; put it and the carrier into one model, or give it springs"
 
 
-AnyStator: TypeAlias = Stator | LumpedStator | MatrixStator
+@dataclass(frozen=True, kw_only=True)
+class Bore(Seat):
+    """A round hole around the shaft or a disc: rigid, or a mass on springs and dampers in both directions.
+
+    Its radial clearance is that of the case and `clearance_offset`, and it has no angle. A rigid bore on a
+    carrier moves with it.
+    """
+
+    KIND = "bore"
+
+    mass: float | None = quantity(
+        "kg", doc="Mass of the hole's body.", example='"2 kg"', default=None, above=0
+    )
+    stiffness: float | None = quantity(
+        "N/m",
+        doc="Stiffness of its support in both lateral directions, in place of stiffness_y and stiffness_z.",
+        example='"1e7 N/m"',
+        default=None,
+        above=0,
+    )
+    stiffness_y: float | None = quantity(
+        "N/m", doc="Vertical stiffness.", example='"1e7 N/m"', default=None, above=0
+    )
+    stiffness_z: float | None = quantity(
+        "N/m", doc="Horizontal stiffness.", example='"8e6 N/m"', default=None, above=0
+    )
+    damping: float | None = quantity(
+        "N s/m",
+        doc="Damping of its support in both directions, in place of damping_y and damping_z.",
+        example='"300 N s/m"',
+        default=None,
+        at_least=0,
+    )
+    damping_y: float | None = quantity(
+        "N s/m", doc="Vertical damping.", example='"300 N s/m"', default=None, at_least=0
+    )
+    damping_z: float | None = quantity(
+        "N s/m", doc="Horizontal damping.", example='"300 N s/m"', default=None, at_least=0
+    )
+    rigid: bool = flag(
+        doc="Whether the hole is fixed to the ground or to its carrier, without mass and stiffness.",
+        example="true",
+        default=False,
+    )
+    centre: tuple[float, ...] = series(
+        "m",
+        doc="Vertical and horizontal position of its centre, at rest, from that of a hole that is aligned.",
+        example='["20 um", "-35 um"]',
+        default=(0.0, 0.0),
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "kind", self.KIND)
+        if self.angle or self.count is not None:
+            key = "angle" if self.angle else "count"
+            raise FieldError(key, "a bore surrounds the rotor and has none; remove it")
+        if len(self.centre) != 2:
+            raise FieldError("centre", 'not two numbers; write ["20 um", "-35 um"], up and across')
+        both = {one: (f"{one}_y", f"{one}_z") for one in ("stiffness", "damping")}
+        if self.rigid:
+            for key in ("mass", *both, *both["stiffness"], *both["damping"]):
+                if getattr(self, key) is not None:
+                    raise FieldError(key, "conflicts with rigid = true, which does not move; remove one")
+            return
+        if self.mass is None:
+            raise FieldError("mass", "missing; give mass and stiffness, or rigid = true")
+        for one, single in both.items():
+            given = [key for key in single if getattr(self, key) is not None]
+            if given and getattr(self, one) is not None:
+                problem = f"conflicts with {one}; give either {one} or {' and '.join(single)}"
+                raise FieldError(given[0], problem)
+            if len(given) == 1 or (one == "stiffness" and not given and self.stiffness is None):
+                missing = next(key for key in single if key not in given) if given else one
+                raise FieldError(missing, f"missing; give {one}, or {' and '.join(single)}")
+
+    @property
+    def springs(self) -> tuple[float, float]:
+        """Vertical and horizontal stiffness, N/m."""
+        return self._both("stiffness")
+
+    @property
+    def dampers(self) -> tuple[float, float]:
+        """Vertical and horizontal damping, N s/m."""
+        return self._both("damping")
+
+    def _both(self, one: str) -> tuple[float, float]:
+        common = getattr(self, one) or 0.0
+        y, z = (getattr(self, f"{one}_{axis}") for axis in "yz")
+        return (common if y is None else y, common if z is None else z)
+
+    def displaced(self, keys: set[str]) -> dict[str, Any]:
+        """Return the changes of other fields when `keys` are set."""
+        changes: dict[str, Any] = {}
+        for one in ("stiffness", "damping"):
+            single = (f"{one}_y", f"{one}_z")
+            if one in keys and not keys & {*single}:
+                changes |= dict.fromkeys(single)
+            elif getattr(self, one) is not None and keys & {*single}:
+                changes |= dict.fromkeys(single, getattr(self, one)) | {one: None}
+        return changes
+
+    @property
+    def carrier_problem(self) -> str:
+        """Nothing: it follows a carrier in both directions."""
+        return ""
+
+
+AnyStator: TypeAlias = Stator | LumpedStator | MatrixStator | Bore
 
 
 def geometries(stators: tuple[AnyStator, ...]) -> tuple[str, ...]:
@@ -285,9 +435,11 @@ def gap_problem(stators: tuple[AnyStator, ...], clearance: float, *, is_ratio: b
     """
     for stator in stators:
         is_wall = isinstance(stator, LumpedStator) and stator.rigid
-        if clearance + stator.clearance_offset <= 0 and (is_wall or is_ratio):
+        if clearance + stator.clearance_offset <= 0 and (is_wall or is_ratio or stator.is_bore):
             gap, shift = (typed_quantity(size, "m") for size in (clearance, stator.clearance_offset))
             problem = f"{gap} and a stator's clearance_offset of {shift} leave no gap"
+            if stator.is_bore:
+                return f"{problem} in a bore; use a larger one"
             if is_ratio:
                 return f"{problem}; give clearance instead"
             return f"{problem} at a rigid stator; use a larger one, or give the stator mass and stiffness"
@@ -314,6 +466,8 @@ def single_stators(stators: tuple[AnyStator, ...]) -> tuple[AnyStator, ...]:
         )
         taken: dict[tuple[int, int], int] = {}
         for i, stator in enumerate(single, 1):
+            if stator.is_bore:
+                continue
             place = (stator.node, round(stator.angle / (2 * math.pi) * 1e9) % 10**9)
             if place in taken:
                 angle = math.degrees(stator.angle) % 360

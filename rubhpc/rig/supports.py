@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -170,6 +171,15 @@ class Support(Masses, Placed):
     pedestal: Pedestal | None = table(
         doc="What the bearing stands on, in series; by default the ground.", default=None
     )
+    until: float | None = quantity(
+        "rev",
+        doc="When it lets go of the shaft, after the record begins: revolutions or a time, up to the next "
+        "whole revolution; by default never. Needs a bore that catches the rotor.",
+        example='"1 revolution"',
+        default=None,
+        at_least=0,
+        or_unit="s",
+    )
 
     def __post_init__(self) -> None:
         Placed.__post_init__(self)
@@ -178,6 +188,13 @@ class Support(Masses, Placed):
     def displaced(self, keys: set[str]) -> dict[str, Any]:
         """Return the changes of other fields when `keys` are set."""
         return Placed.displaced(self, keys) | Masses.displaced(self, keys)
+
+    def let_go_at(self, spin: float) -> float:
+        """Whole revolutions after which it lets go of a shaft with this spin, rad/s; infinite: never."""
+        if self.until is None:
+            return math.inf
+        turns = self.until * (abs(spin) / (2.0 * math.pi) if getattr(self.until, "unit", "") == "s" else 1.0)
+        return float(math.ceil(turns * (1.0 - 1e-12)))
 
 
 def _check_pairs(owner: Masses, one: str, pairs: tuple[str, ...]) -> None:

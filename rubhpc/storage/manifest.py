@@ -13,6 +13,7 @@ from rubhpc.errors import StoreError
 from rubhpc.schema import (
     VARIABLES,
     Variable,
+    bore_variables,
     branch_variables,
     drive_variables,
     probe_variables,
@@ -152,6 +153,8 @@ class Manifest:
         """The arrays stored for every case and written block by block, in the order of their checksum."""
         probed = _probed(self.parts)
         known = VARIABLES | probe_variables(probed) | branch_variables() | run_up_variables(probed)
+        if any(stator.get("kind") == "bore" for stator in self.parts["rig"].get("stator", [])):
+            known |= bore_variables()
         if "drive" in self.parts:
             known |= drive_variables()
         return tuple(v for v in known.values() if v.role in self.keep)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypedDict
 
 from rubhpc.input.fields import FieldError, check_fields, choice, quantity, series
-from rubhpc.input.quantity import WithUnit
 from rubhpc.models import MODELS, chosen, default_of
+from rubhpc.rig.normal_law import LAWS, take_units
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,7 +24,6 @@ NEEDS_LAW: dict[str, tuple[str, tuple[str, ...], str]] = {
     "slip_speed": ("friction_law", ("table",), "other laws have no table"),
     "friction_ratio": ("friction_law", ("table",), "other laws have no table"),
 }
-UNITS = {"stiffness": ("N/m", "N/m^1.5"), "damping": ("N*s/m", "s/m")}  # of a penalty, of Hertz's law
 _EXAMPLES = {
     ("law", "penalty"): {"stiffness": "1e8"},
     ("law", "hertz"): {"stiffness": '"1e10 N/m^1.5"'},
@@ -41,7 +40,7 @@ class ContactKeys:
         doc="Contact law: multipliers that close gaps exactly, a spring and damper (penalty), or Hertz's law "
         "with Hunt and Crossley's damping.",
         example='"penalty"',
-        of=("lagrange", "penalty", "hertz"),
+        of=LAWS,
         default="lagrange",
     )
     stiffness: float | None = quantity(
@@ -163,12 +162,7 @@ class Contact(ContactKeys):
             for key, example in needed.items():
                 if getattr(self, kind) == law and getattr(self, key) is None:
                     raise FieldError(key, f'missing; {kind} = "{law}" needs one, such as {key} = {example}')
-        for key, units in UNITS.items():
-            given, unit = getattr(self, key), units[self.law == "hertz"]
-            if isinstance(given, WithUnit):
-                if given.unit != unit:
-                    raise FieldError(key, f'{given:g} {given.unit}: law = "{self.law}" needs one in {unit}')
-                object.__setattr__(self, key, float(given))
+        take_units(self, self.law, "law")
         if self.restitution is not None and self.restitution > 1:
             raise FieldError("restitution", f"{self.restitution:g} is out of range; it must be at most 1")
         if self.slip_speed is not None and self.friction_ratio is not None:

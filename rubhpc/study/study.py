@@ -323,7 +323,7 @@ class Study:
             )
         check_rigs(self.rig, self.axes, self.recording.probe)
         for contact in contacts:
-            check_method(contact, self.integrator, is_bent=self.has_bent_stator)
+            check_method(contact, self.integrator, is_bent=self.has_bent_stator, stators=self._freest_stators)
 
     @property
     def has_bent_stator(self) -> bool:

@@ -12,6 +12,9 @@ from rubhpc.rig.probes import Probe  # noqa: TC001 - annotations are read when a
 from rubhpc.schema import KEEPABLE, KEPT
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rubhpc.rig.stators import AnyStator
     from rubhpc.study.contact_keys import Contact
 
 # Transient until the motion has settled, is solved for, or is one of those solved for all starts.
@@ -65,16 +68,30 @@ class Integrator:
         return self.step if self.step is not None else min(PAPER_STEP, SAFE_SHARE * limit)
 
 
-def check_method(contact: Contact, integrator: Integrator, *, is_bent: bool = False) -> None:
-    """Refuse what the central difference does not know: second-order stators and Hertz's law.
+def check_method(
+    contact: Contact, integrator: Integrator, *, is_bent: bool = False, stators: Sequence[AnyStator] = ()
+) -> None:
+    """Refuse what the central difference does not know, such as second-order stators, bores and Hertz's law.
+
+    A bore is refused with the fixed normal too.
 
     Raises
     ------
     InputError
         Says what it needs instead.
     """
+    bore = next((i for i, stator in enumerate(stators, 1) if stator.is_bore), None)
+    if bore is not None and contact.normal == "fixed":
+        problem = f"stator.{bore} is a bore, whose contact point moves around"
+        raise InputError(f'[contact] normal: {problem}; set normal = "updated"')
     if integrator.method == "modal":
         return
+    for i, stator in enumerate(stators, 1):
+        if stator.has_own_contact:
+            problem = f"stator.{i} is a bore, or has a law or friction_factor of its own"
+            raise InputError(
+                f'[integrator] method: {integrator.method} needs one law: {problem}; use "modal"'
+            )
     if is_bent:
         problem = f"{integrator.method} needs stators of linear geometry"
         fix = 'add [contact] model = "mokhtar2017", or [override] "stator.geometry" = "linear"'

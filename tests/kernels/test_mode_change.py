@@ -33,8 +33,6 @@ def bodies(rng, q, friction=0.0, restitution=0.0):
         restitution=restitution,
         clearance=np.full(q, 1e-4),
         slip=np.zeros((q, N)),
-        spring=0.0,
-        damper=0.0,
         translations=np.eye(N),
         displacement_limit=np.inf,
         overlap=0.0,

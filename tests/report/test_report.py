@@ -22,12 +22,14 @@ from postproc.report.budget import write_report
 from postproc.report.cases import Cases
 from postproc.report.grid import Measures, described_axes
 from postproc.report.page import Page, least_size
+from postproc.report.pictures import whirl_facts
 from postproc.store.attributes import table_of
 from postproc.store.open import open_store
 from rubhpc.commands.report import report
 from rubhpc.errors import InputError
 from rubhpc.rig.reading import read_rig
 from rubhpc.rig.rig import Rig
+from rubhpc.rig.stators import Bore
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -335,3 +337,16 @@ def test_masses_have_no_euler_load() -> None:
     assert of_keys.isdisjoint(Measures(beams).names)
     strong = beams.assign_attrs(rig=beams.attrs["rig"] | {"stator": [mass | {"strength": 100.0}]})
     assert of_keys & set(Measures(strong).names) == {"force_over_strength"}
+
+
+def test_the_page_says_what_can_whirl_in_a_bore(synthetic_path: Path) -> None:
+    store = open_store(synthetic_path)
+    assert not whirl_facts(store)["sentences"], "no bore"
+    bored = store.copy()
+    hole = Bore(node=8, mass=1.0, stiffness=1e6, damping=100.0)
+    rig = replace(read_rig("mokhtar2017"), stator=(hole,))
+    bored.attrs = store.attrs | {"rig": rig.as_dict()}
+    text = Page(bored).html(values={})
+    assert 'href="#whirl"' in text
+    assert "Stator 1, node 8: no dry whirl" in text
+    assert text.count("data:image/png") == 1

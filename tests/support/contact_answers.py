@@ -15,7 +15,7 @@ import numpy as np
 from independent_contact import solve
 from overhung_pump import pump
 
-from rubhpc import Carrier, LumpedStator, read_rig
+from rubhpc import Bore, Carrier, LumpedStator, read_rig
 from rubhpc.rig.reading import with_keys
 
 DATA = Path(__file__).parent.parent / "data" / "contact_answers.npz"
@@ -51,6 +51,12 @@ def two_nodes():
     return replace(BENT, stator=(one, replace(one, node=5, radius=0.01, angle=2.5, clearance_offset=-2e-5)))
 
 
+def bore(node=8, **given):
+    """A round hole about the disc, or about its hub."""
+    return replace(PACKAGED, stator=(Bore(node=node, **given),))
+
+
+SPRUNG = {"mass": 1.5, "stiffness_y": 4e6, "stiffness_z": 2e6, "damping": 200.0}
 UPDATED = {"normal": "updated"}
 COULOMB = {"friction_law": "coulomb"}
 STICK = COULOMB | {"static_friction_ratio": 1.3}
@@ -113,6 +119,14 @@ CASES = {
         UPDATED | COULOMB,
     ),
     "two nodes": (two_nodes(), UPDATED | COULOMB),
+    "bore": (bore(**SPRUNG), UPDATED | {"friction": 0.1}),
+    "bore, coulomb": (bore(**SPRUNG, radius=2e-3), UPDATED | COULOMB),
+    "bore, restitution": (bore(**SPRUNG), UPDATED | COULOMB | {"restitution": 0.4, "friction": 0.1}),
+    "bore, penalty": (bore(**SPRUNG, radius=5e-3), UPDATED | PENALTY | COULOMB | {"damping": 100.0}),
+    "bore, hertz, gravity": (
+        with_keys(bore(rigid=True, radius=3e-3), WEIGHT | {"stator.clearance_offset": "-60 um"}),
+        UPDATED | HERTZ | STICK | {"damping": 1.0},
+    ),
 }
 
 

@@ -60,9 +60,9 @@ def run(rig, case, longest_step, **start):
     offset = [stator.clearance_offset for stator in rig.stator]
     radius = np.array([rig.contact_radius(stator) for stator in rig.stator])
     angle = np.array([stator.angle for stator in rig.stator])
-    return march_bodies(
-        bodies, spin, case, radius, angle, case["clearance"] + np.array(offset), longest_step, **start
-    )
+    clearance = case["clearance"] + np.array(offset)
+    is_bore = np.array([stator.is_bore for stator in rig.stator])
+    return march_bodies(bodies, spin, case, radius, angle, clearance, longest_step, is_bore=is_bore, **start)
 
 
 def first_lateral_frequency(rig):
@@ -96,7 +96,7 @@ def pair_rows(bodies, radius, angle):
     return rows
 
 
-def march_bodies(bodies, spin, case, radius, angle, clearance, longest_step, start=None):
+def march_bodies(bodies, spin, case, radius, angle, clearance, longest_step, start=None, is_bore=None):
     """March from equilibrium, or from `start` (2, n) of displacements and velocities, and measure."""
     n, q = len(bodies.mass), len(radius)
     revolutions, per_revolution = case["revolutions"], case.get("samples_per_revolution", 64)
@@ -104,6 +104,7 @@ def march_bodies(bodies, spin, case, radius, angle, clearance, longest_step, sta
     interval = 2 * math.pi / abs(spin) / per_revolution
     halved = max(2, math.ceil(math.log2(interval / longest_step)))  # intervals, to steps of contact
     lengths = interval / 2.0 ** np.arange(halved + FINEST, -1, -1)
+    roundness = radius if is_bore is None else np.where(is_bore, -clearance, radius)
     laws, table = read_laws(case, fade=lengths[FINEST] / 2)
 
     inverse = np.linalg.inv(bodies.mass)
@@ -118,7 +119,7 @@ def march_bodies(bodies, spin, case, radius, angle, clearance, longest_step, sta
     whirl = np.concatenate([whirl, 1j * spin * whirl])
     rows = pair_rows(bodies, radius, angle)
     m = rows.shape[1]
-    sag, still = at_rest(bodies, rows, radius, clearance, laws)
+    sag, still = at_rest(bodies, rows, roundness, clearance, laws)
     first = np.array([still, np.zeros(n)]) if start is None else np.array(start)
     first[0] -= sag
     z = enter @ (first.ravel() - whirl.real)
@@ -147,7 +148,7 @@ def march_bodies(bodies, spin, case, radius, angle, clearance, longest_step, sta
         np.concatenate([z.real, z.imag]),
         (states, bins, late, sums),
         (decay.real.copy(), decay.imag.copy(), kicks, answer, look, np.abs(rows @ shape[n:]), steady),
-        (radius, clearance, abs(spin) * radius),
+        (roundness, clearance, abs(spin) * radius),
         (np.sign(spin), lengths, per_revolution),
         laws,
         table,
@@ -236,7 +237,10 @@ def peak(bins, late, width):
 
 @njit(cache=True)
 def look_at(x, radius, clearance, laws, sense, along, across):
-    """Gap, and its gradient and that of the tip's advance along the rim in the motions of a pair."""
+    """Gap, and its gradient and that of the tip's advance along the rim in the motions of a pair.
+
+    A bore has the radius minus its clearance: `x` is the motion of its centre relative to the rim's.
+    """
     is_round = laws[9] > 0.0
     back, side = clearance + x[0], x[1]
     for k in range(3, x.size):
@@ -244,6 +248,9 @@ def look_at(x, radius, clearance, laws, sense, along, across):
     c, s, gap = 1.0, 0.0, back
     if is_round:
         distance = math.hypot(radius + back, side)
+        if radius < 0.0:
+            back += 1e-30 * (distance == 0.0)
+            distance = -max(distance, 1e-30)
         gap = ((2.0 * radius + back) * back + side**2) / (distance + radius)
         c, s = (radius + back) / distance, side / distance
     along[0], along[1], along[2] = c, s, 0.0
@@ -384,7 +391,8 @@ def march(y, kept, tables, given, grid, laws, table):
             pair = given[0][i], given[1][i], given[2][i]
             before[0, i], before[3, i], before[1, i] = see(x0[i], v0[i], pair, laws, sense, al, ac)
             of = speed[i * m : (i + 1) * m]
-            closing = of[0] + of[1] * (0.02 + abs(x0[i, 1]) / pair[0]) + of[3:] @ (np.abs(x0[i, 3:]) + 1e-3)
+            slant = 0.02 + abs(x0[i, 1]) / pair[0] if pair[0] > 0.0 else 1.0
+            closing = of[0] + of[1] * slant + of[3:] @ (np.abs(x0[i, 3:]) + 1e-3)
             reach = min(reach, max(before[0, i], 0.0) / closing)
         while not is_closed and level < top and lengths[level + 1] < 0.7 * reach:
             level += 1

@@ -127,6 +127,10 @@ def squared_slope(stator):
 
 def stator_parts(stator):
     """M, D, K of axial and of lateral motion, and how many degrees belong to the root, which come first."""
+    if stator.is_bore:
+        both = zip(stator.dampers, stator.springs, strict=True)
+        spring = np.array([[1.0, -1.0], [-1.0, 1.0]])
+        return [(np.diag([0.0, stator.mass]), c * spring, k * spring, 1) for c, k in both if not stator.rigid]
     if hasattr(stator, "rigid"):
         held = [(stator.mass, stator.damping, stator.stiffness)] * (not stator.rigid)
         if stator.lateral_stiffness is not None:

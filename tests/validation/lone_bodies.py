@@ -88,4 +88,5 @@ def set_up_modal(rotor, stators, spin, per_revolution, contact, *, force=None, l
         is_updated=contact.normal == "updated",
         displacement_limit=math.inf,
         law=law_of(contact),
+        accuracy=1e-6,
     )

@@ -125,7 +125,8 @@ def test_mass_comes_to_rest_on_a_wall_far_above_its_sag(restitution, mass, law, 
     assert record.left_closed_form == 0
     assert record.contact_impulse[0] == pytest.approx(mass * impulse / 6, rel=1e-9)
     rests = int(256 * time) + 2
-    assert record.vertical[rests:] == pytest.approx(np.full(6 * 256 - rests, -1.0), abs=1e-12)
+    fades = 1e-12 if record.scheme == 0 else 1e-9  # by collocation the gap goes to zero in some steps
+    assert record.vertical[rests:] == pytest.approx(np.full(6 * 256 - rests, -1.0), abs=fades)
     assert record.contact_force[0, rests:] == pytest.approx(np.full(6 * 256 - rests, 8.81 * mass))
 
 

@@ -120,10 +120,13 @@ class Orbit extends Plane {
   // The circle of the clearance, and the face of each stator, none without a gap; returns their corners.
   bench(gap, factor, places, reach) {
     const turn = gap > 0 ? Array.from({ length: 121 }, (_, i) => (i * Math.PI) / 60) : [];
-    const [, , z0 = 0, y0 = 0] = (places[0] ?? []).map((value) => value * factor); // about which they are set
+    const bore = places.find(([angle]) => angle === null); // it has no angle: its wall is the circle
+    const [, offset0, z0 = 0, y0 = 0] = (bore ?? places[0] ?? []).map((value) => value * factor); // about which they are set
+    if (bore && gap > 0) gap += offset0;
     this.circle.data = { z: turn.map((a) => z0 + gap * Math.sin(a)), y: turn.map((a) => y0 + gap * Math.cos(a)) };
     const halfAngle = Math.PI / Math.max(places.length, 3); // the stators of a ring do not overlap
-    const faces = (gap > 0 ? places : []).map(([angle, offset]) => {
+    const stubs = gap > 0 ? places.filter(([angle]) => angle !== null) : [];
+    const faces = stubs.map(([angle, offset]) => {
       const near = gap + offset * factor, far = near + 0.12 * reach, half = Math.min(0.22 * reach, 0.8 * near * Math.tan(halfAngle));
       const [s, c] = [Math.sin(angle), Math.cos(angle)];
       const corner = (along, across) => [z0 + along * s + across * c, y0 + along * c - across * s];

@@ -10,7 +10,15 @@ import numpy as np
 
 from rubhpc.errors import InputError
 from rubhpc.integrate.branches.events import Event, half_change, halving
-from rubhpc.integrate.branches.grazing import grazing, grazing_beside, passed, touches
+from rubhpc.integrate.branches.grazing import (
+    closed_around,
+    filled,
+    grazing,
+    grazing_beside,
+    grazing_between,
+    passed,
+    touches,
+)
 from rubhpc.integrate.branches.point import away_from_events
 from rubhpc.integrate.branches.weak_impact import weakly_impacting
 from rubhpc.integrate.periodic_motions.piecewise_motion import Unfollowed
@@ -32,6 +40,7 @@ SHORT = 0.02  # length of a step that may pass a motion of half the period
 FEWEST = 6  # points of a closed branch
 ANYWHERE = 1e-3  # of a step, accuracy of where it ends
 SHORTEST = 1e-3  # length of a step in which several contacts may appear and vanish at once
+NEARBY = 1e-2  # length within which a branch is lost at a grazing
 BEYOND = (0.02, 0.1, 0.5)  # steps past a grazing at which the branch is sought again
 
 
@@ -118,7 +127,8 @@ def follow(
                     continue
                 if is_near and (length <= SHORT or not is_back):
                     events_between = passed(branching, base, trial, is_last=is_last)
-                    if events_between is not None or is_last:
+                    is_misled = _is_misled(branching, base, guess, trial, events_between or [])
+                    if (events_between is not None or is_last) and not is_misled:
                         found, happened = trial, events_between or []
                         break
                 length *= 0.5
@@ -128,6 +138,8 @@ def follow(
                     follower = _beyond(branching, history[-2:], base, point)
                 elif len(history) > 1 and (other := _beyond(branching, history[-2:], base, base)):
                     corner_there = grazing_beside(branching, base, other)  # behind a sharp corner
+                    if corner_there is None and any(closed_around(base)):  # an orbit that fills a bore
+                        corner_there = grazing_between(branching, base, other)
                     if corner_there and _is_close(branching, base, corner_there.point):
                         point, follower = corner_there.point, other
                 if point is None:
@@ -203,12 +215,29 @@ def _is_near(branching: Branching, history: list[Point], guess: Floats, found: P
     return bool(moved > 0.0 and change @ guess > STRAIGHT * moved * length and moved < 2.0 * length)
 
 
+def _is_misled(
+    branching: Branching, base: Point, guess: Floats, trial: Point, happened: list[tuple[Event, Point]]
+) -> bool:
+    """Whether a grazing lies behind, where the branch has come from, or next to a motion that fills a bore.
+
+    On the wrong side of the grazing such a motion seems to be there, with forces within their error.
+    """
+    for event, point in happened:
+        if event is Event.GRAZING:
+            away = branching.difference(base, point)
+            is_behind = away.size == guess.size and away @ guess < 0.0
+            if is_behind or (filled(trial) and _is_close(branching, trial, point)):
+                return True
+    return False
+
+
 def _beyond(branching: Branching, history: list[Point], base: Point, grazing_point: Point) -> Point | None:
     """A motion with other contacts next to a grazing: by a weak impact, or along the parameter."""
 
     def follows(found: Point) -> bool:
-        is_near = np.linalg.norm(branching.difference(grazing_point, found)) < 1.0
-        return bool(touches(found) != touches(base) and is_near)
+        away = np.linalg.norm(branching.difference(grazing_point, found))
+        is_sure = away > NEARBY or not filled(found)
+        return bool(touches(found) != touches(base) and away < 1.0 and is_sure)
 
     with suppress(NotConverged):
         if follows(found := weakly_impacting(branching, history)):
@@ -216,17 +245,18 @@ def _beyond(branching: Branching, history: list[Point], base: Point, grazing_poi
     sense = np.sign(grazing_point.value - history[0].value)
     along = grazing_point.parameter_axis
     for steps in BEYOND:
-        for direction in (sense, -sense):
-            with suppress(NotConverged):
-                found = branching.correct(grazing_point, direction * steps * along, along, most=12)
-                if follows(found):
-                    return found
+        for start in (grazing_point, *closed_around(grazing_point)):
+            for direction in (sense, -sense):
+                with suppress(NotConverged):
+                    found = branching.correct(start, direction * steps * along, along, most=12)
+                    if follows(found):
+                        return found
     return None
 
 
 def _is_close(branching: Branching, base: Point, point: Point) -> bool:
-    """Whether a motion with other contacts is as near as a last short step."""
-    return bool(np.linalg.norm(branching.difference(base, point)) < SHORTEST)
+    """Whether a motion with other contacts is as near as some last short steps."""
+    return bool(np.linalg.norm(branching.difference(base, point)) < NEARBY)
 
 
 def _is_back(found: Point, base: Point) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from contextlib import suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -11,8 +12,10 @@ import numpy as np
 from rubhpc.integrate.branches.branching import STEEP
 from rubhpc.integrate.branches.events import Event, crossings, tolerance_of
 from rubhpc.integrate.branches.weak_impact import DEPTH, weakly_impacting
+from rubhpc.integrate.periodic_motions.collocated_motion import code_of, states_of
 from rubhpc.integrate.periodic_motions.revolution import least_of
 from rubhpc.integrate.periodic_motions.shooting import NotConverged
+from rubhpc.kernels.collocation.structures import FORWARD, OPEN
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -36,6 +39,8 @@ CLOSE = 1e-4  # steps before a grazing at which its point may lie
 BESIDE = 1e-3, 1e-2, 0.1  # shares of a step from a grazing, at which the motion with more contacts is sought
 MISSED = 1e-4  # of a step, or of a gap, that may be left where it is taken to vanish
 MEETING, NEIGHBOURS = 0.5, 2.0  # of a step, within which the motions on both sides of a grazing lie
+SLOW = 1e-9  # of a whirl in the gap, speed of approach of a motion along the wall of a bore
+OUTWARD = 1.001  # times a motion in a bore: surely pressed against it
 WITHIN_REACH = 3.0  # steps, in which a distance to grazing would vanish
 
 
@@ -74,8 +79,32 @@ def passed(
 
 
 def touches(point: Point) -> Counter[int]:
-    """Touches of each pair in a period."""
-    return Counter(pair for _, touching in point.sequence for pair in touching)
+    """Touches of each pair in a period; one of a bore that it fills."""
+    found = Counter(pair for _, touching in point.sequence for pair in touching)
+    found.update({i: 1 - found[i] for i in filled(point)})
+    return found
+
+
+def filled(point: Point) -> list[int]:
+    """Bores that a motion touches all around: it never leaves their wall, or comes back without a speed."""
+    bores = [i for i, stator in enumerate(point.case.setup.model.stators) if stator.is_bore]
+    if not bores:
+        return []
+    is_closed = np.array([states_of(code, point.case.q) != OPEN for code, _ in point.sequence])
+    leaves = np.any(is_closed[:-1] & ~is_closed[1:], axis=0)
+    speed = np.zeros(point.case.q)
+    for piece in point.pieces:
+        speed[piece.touching] = np.maximum(speed[piece.touching], piece.approach)
+    slow = SLOW * abs(point.case.setup.spin) * point.case.bodies.clearance
+    return [i for i in bores if is_closed[:, i].any() and (not leaves[i] or speed[i] < slow[i])]
+
+
+def closed_around(point: Point) -> list[Point]:
+    """Starts of motions that press against a bore all around, one for each that this motion never touches."""
+    q, touched = point.case.q, touches(point)
+    free = [i for i, stator in enumerate(point.case.setup.model.stators) if stator.is_bore and not touched[i]]
+    pressed = [point.states | code_of(FORWARD * (np.arange(q) == i)) for i in free]
+    return [replace(point, motion=OUTWARD * point.motion, states=states) for states in pressed]
 
 
 def distances(point: Point) -> Floats:
@@ -243,14 +272,20 @@ def grazing_beside(branching: Branching, a: Point, b: Point) -> Grazing | None:
             pair = [(0.0, free), (sense * move, branching.correct(free, sense * move * held, held))]
             if (root := _root(pair)) is not None:
                 break
+        left = APPROACH
         for _ in range(MOST_TRIALS):
             near, point = pair[-1]
-            if root is None or abs(root) > WITHIN_REACH or point.sequence != free.sequence:
+            if root is None or abs(root) > WITHIN_REACH or left > 0.99:
                 return None
             if abs(root - near) * branching.step < branching.located(point):
                 break
-            there = root + APPROACH * (near - root)
-            pair = [pair[-1], (there, branching.correct(point, (there - near) * held, held))]
+            there = root + left * (near - root)
+            ahead = branching.difference(pair[-2][1], point) / (near - pair[-2][0])
+            trial = branching.correct(point, (there - near) * ahead, held)
+            if trial.sequence != free.sequence:  # on the way to it the other contact closes
+                left = 0.5 * (1.0 + left)
+                continue
+            pair = [pair[-1], (there, trial)]
             root = _root(pair)
         else:
             return None

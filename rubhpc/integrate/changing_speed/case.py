@@ -93,7 +93,12 @@ def record_run_up(
     if not found.reason:
         lasts = 2.0 * np.pi / found.speed
         of_contacts = contact_measures(
-            found.together, found.whole, turns, setup.model, is_round=setup.is_updated
+            found.together,
+            found.whole,
+            turns,
+            setup.model,
+            duration=float(lasts.sum()),
+            is_round=setup.is_updated,
         )
         measures |= of_contacts | {
             "contact_fraction": lasts @ found.contact_fraction / lasts.sum(),

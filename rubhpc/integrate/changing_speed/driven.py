@@ -108,7 +108,7 @@ def integrate_driven(
     if pieces_per_revolution is not None:
         length = piece_length(per_revolution, pieces_per_revolution)
     swings, cuts = [], [0]  # as of `bring_to_angles`
-    whole = empty_samples(model.n_place, n * per_revolution, model.n_probe).whole
+    whole = empty_samples(model.n_place, n * per_revolution, model.n_probe, model.n_push).whole
     gathered = Turns(n, model)
     driven_by, braked = np.zeros((2, n))
     begins = np.zeros(n + 1)

@@ -420,7 +420,7 @@ class Passing:
 
     def _room_for(self, model: Model, n_sample: int) -> Samples:
         if n_sample not in self._room:
-            self._room[n_sample] = empty_samples(model.n_place, n_sample, model.n_probe)
+            self._room[n_sample] = empty_samples(model.n_place, n_sample, model.n_probe, model.n_push)
         return self._room[n_sample]
 
 

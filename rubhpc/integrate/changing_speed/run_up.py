@@ -21,7 +21,7 @@ from rubhpc.integrate.changing_speed.pieces import Pieces
 from rubhpc.integrate.changing_speed.turns import Turns, bring_to_angles
 from rubhpc.integrate.changing_speed.twist_ramp import moved, sag_ramp
 from rubhpc.integrate.marches.modal import Place
-from rubhpc.integrate.measuring.samples import empty_samples, lift_samples, new_accumulator
+from rubhpc.integrate.measuring.samples import empty_samples, lift_samples, new_accumulator, probe_part
 from rubhpc.integrate.record import State
 from rubhpc.integrate.start import start_of
 from rubhpc.study.initial import CONTACT_FREE, Initial
@@ -115,7 +115,7 @@ def integrate_run_up(
     times, at_cuts, _ = law.at_angle(angles)
     _, _, accelerations = law.at_angle(0.5 * (angles[1:] + angles[:-1]))
     begins, _, _ = law.at_angle(2.0 * np.pi * np.arange(n + 1))
-    whole = empty_samples(model.n_place, n * per_revolution, model.n_probe).whole
+    whole = empty_samples(model.n_place, n * per_revolution, model.n_probe, model.n_push).whole
     gathered = Turns(n, model)
     reached: State | Place | None = initial if isinstance(initial, State) else None
     n_step, reason, n_done = 0, "", n
@@ -183,7 +183,7 @@ def integrate_run_up(
             reached, earlier = passed.end, passed.accumulators[-1]
             if late[piece]:  # the inertia of the twist does not follow immediately
                 seen = model.probe_rows[2, :, : unit.size] @ unit
-                passed.whole[4 + 3 * model.n_place :, 0] += sudden[piece] * seen
+                passed.whole[probe_part(model), 0] += sudden[piece] * seen
                 reached = moved(reached, block[place], -late[piece] * unit, none)
             n_step += passed.n_step
             whole[:, first : first + size] = passed.whole

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rubhpc.integrate.measuring.monitors import carrier_displacement, monitored
+from rubhpc.integrate.measuring.rub_in_bores import rub_measures
 from rubhpc.integrate.measuring.samples import empty_samples, new_accumulator
 from rubhpc.kernels.resampling import resample
 
@@ -78,15 +79,15 @@ class Turns:
 
 
 def contact_measures(
-    together: Accumulator, whole: Floats, n_revolution: int, model: Model, *, is_round: bool
+    together: Accumulator, whole: Floats, n_revolution: int, model: Model, *, duration: float, is_round: bool
 ) -> dict[str, Any]:
     """Measures of the contacts of a whole record, as at constant speed (`measures_of`).
 
-    `together` is the accumulator of all revolutions, `whole` their samples (`Samples.whole`), `is_round`
-    whether the gap includes the roundness of the rim.
+    `together` is the accumulator of all revolutions, `whole` their samples (`Samples.whole`), `duration`
+    their time, s, and `is_round` whether the gap includes the roundness of the rim.
     """
     has_touched = together.impulse > 0.0
-    samples = empty_samples(model.n_place, whole.shape[1], model.n_probe)
+    samples = empty_samples(model.n_place, whole.shape[1], model.n_probe, model.n_push)
     samples.whole[:] = whole
     none = np.zeros(len(model.stators))
     return {
@@ -100,6 +101,7 @@ def contact_measures(
         ),
         "minimum_slip_speed": np.where(np.isfinite(together.least_slip), together.least_slip, np.nan),
         "carrier_displacement": carrier_displacement(samples, model),
+        **rub_measures(samples.push, together, duration, model),
     } | monitored(samples, together, model, is_round=is_round)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rubhpc.integrate.marches.modal import Place
+from rubhpc.integrate.measuring.samples import probe_part
 from rubhpc.integrate.record import State
 
 if TYPE_CHECKING:
@@ -60,11 +61,11 @@ class TwistRamp(NamedTuple):
             return
         model, n_sample = setup.model, whole.shape[1]
         share = 2.0 * np.arange(n_sample) / n_sample - 1.0  # of the half, at each sample
-        n, first_probe = self.half.size, 4 + 3 * model.n_place
+        n = self.half.size
         whole[:3] += np.outer(replace(model, sag=self.half).output_sag, share)
         positions, rates, _ = model.probe_rows[:, :, :n]
         seen = positions @ self.half if self.constant is None else self.constant
-        whole[first_probe:] += np.outer(seen, share) + (rates @ self.rate)[:, np.newaxis]
+        whole[probe_part(model)] += np.outer(seen, share) + (rates @ self.rate)[:, np.newaxis]
 
 
 def sag_ramp(

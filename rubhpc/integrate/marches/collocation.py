@@ -13,7 +13,7 @@ from rubhpc.integrate.marches.modal import ModalMarch, slowest_fast
 from rubhpc.integrate.measuring.samples import no_record
 from rubhpc.integrate.overlaps import with_overlap
 from rubhpc.kernels.case_progress import LONG_AGO, PAUSED, restart_clock, shaft_turn
-from rubhpc.kernels.collocation.flight import LEAST_GAP
+from rubhpc.kernels.collocation.flight import GAP_BEFORE, LEAST_GAP
 from rubhpc.kernels.collocation.march import LEAST_SCALE, SETTLED, advance_by_collocation
 from rubhpc.kernels.collocation.observing import Seen
 from rubhpc.kernels.collocation.structures import (
@@ -29,7 +29,7 @@ from rubhpc.kernels.collocation.structures import (
     new_memory,
 )
 from rubhpc.kernels.collocation.tangent import FULL as TOO_MANY
-from rubhpc.kernels.collocation.tangent import Trail
+from rubhpc.kernels.collocation.tangent import LOW, N_EVENT, PAIR, Trail
 from rubhpc.kernels.sampling import Measured
 
 if TYPE_CHECKING:
@@ -190,8 +190,18 @@ class CollocationMarch(ModalMarch):
                 self.check()
         self.trail, self.accuracy = None, own
         np.minimum(trail.least[0], self._solution.turned[LEAST_GAP], out=trail.least[0])
-        self._solution.turned[LEAST_GAP] = np.inf
+        self._fill_constant(trail)
+        self._solution.turned[[LEAST_GAP, GAP_BEFORE]] = np.inf
         return outcome, trail
+
+    def _fill_constant(self, trail: Trail) -> None:
+        """Note gaps and forces in bores that never turn, of pairs without events: the orbit is a circle."""
+        is_constant = self._contacts.radius < 0.0
+        is_constant[trail.event[: trail.count[N_EVENT], PAIR]] = False
+        is_open = self.states == OPEN
+        lasts = self._solution.turned[GAP_BEFORE], trail.swing[LOW]
+        for least, last, is_so in zip(trail.least, lasts, (is_open, ~is_open), strict=True):
+            np.copyto(least, last, where=is_constant & is_so & np.isinf(least))
 
     def keep(self, trail: object) -> None:
         """Nothing: events are kept where a tangent is carried."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from rubhpc.integrate.packing import output_degrees
 from rubhpc.integrate.record import Record, State
-from rubhpc.schema import DIVERGED, VARIABLES, lyapunov_variables, probe_variables
+from rubhpc.schema import DIVERGED, VARIABLES, bore_variables, lyapunov_variables, probe_variables
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -81,6 +81,8 @@ def diverged_record(
     settings: dict[str, float],
     final: State,
     reached: dict[str, Floats] | None = None,
+    *,
+    has_bore: bool = False,
 ) -> Record:
     """Record of a diverged case: its signals up to the divergence, and NaN elsewhere.
 
@@ -96,12 +98,14 @@ def diverged_record(
         "section": recording.revolutions,
     }
     variables = VARIABLES | probe_variables(recording.probed) | lyapunov_variables(recording.lyapunov)
+    if has_bore:
+        variables |= bore_variables()
     groups: dict[str, dict[str, Any]] = {"waveform": {}, "spectrum": {}, "section": {}, "measure": {}}
     for name, variable in variables.items():
         if variable.role == "measure" and not variable.dims:
             groups["measure"][name] = -1 if variable.dtype.startswith("int") else np.nan
         elif variable.role == "measure" or variable.role in recording.keep:
-            groups[variable.role][name] = np.full([length[dim] for dim in variable.dims], np.nan)
+            groups[variable.role][name] = np.full([length[dim] for dim in variable.dims], variable.fill_value)
     groups["measure"]["regime"] = -1
     for name, values in (reached or {}).items():
         if name in groups["waveform"]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rubhpc.integrate.measuring.rub_in_bores import bore_signals
 from rubhpc.kernels.accumulators import (
     HORIZONTAL,
     TWIST,
@@ -28,21 +29,22 @@ if TYPE_CHECKING:
 _WIDEST = np.array([[-np.inf] * 3, [np.inf] * 3])  # extrema before the first sample
 
 
-def empty_samples(n_place: int, n_sample: int, n_probe: int = 0) -> Samples:
+def empty_samples(n_place: int, n_sample: int, n_probe: int = 0, n_push: int = 0) -> Samples:
     """Array for the samples of a record: one array, so that their spectra are computed together.
 
     Places (`Model.n_place`) are the stators, then the carriers, with vertical motion as axial and horizontal
-    motion as lateral, then their rotations as lateral motion.
+    motion as lateral, then their rotations as lateral motion. `n_push` stators have their forces as vectors.
     """
     first_probe = 4 + 3 * n_place
-    whole = np.zeros((first_probe + n_probe, n_sample))
+    whole = np.zeros((first_probe + n_probe + 4 * n_push, n_sample))
     axial, lateral, force = whole[4:first_probe].reshape(3, n_place, n_sample)
     return Samples(
         rotor=whole[:4],
         axial=axial,
         lateral=lateral,
         force=force,
-        probe=whole[first_probe:],
+        probe=whole[first_probe : first_probe + n_probe],
+        push=whole[first_probe + n_probe :].reshape(n_push, 4, n_sample),
         whole=whole,
     )
 
@@ -88,7 +90,7 @@ def stacked_accumulators(n: int, before: Accumulator) -> Accumulator:
 
 def _accumulator(n_stator: int, n_place: int, **window: Any) -> Accumulator:
     """Zero accumulator except for the window of the mean force; a run-up makes one per revolution."""
-    contact_time, impulse, stick_time, friction_work, peak_force, least_slip = np.zeros((6, n_stator))
+    contact_time, impulse, stick_time, friction_work, peak_force, least_slip, turned = np.zeros((7, n_stator))
     n_contact, sense, reversals = np.zeros((3, n_stator), dtype=np.int64)
     highest, lowest = _WIDEST.copy()
     least_slip[:] = np.inf
@@ -104,6 +106,7 @@ def _accumulator(n_stator: int, n_place: int, **window: Any) -> Accumulator:
         reversals=reversals,
         friction_work=friction_work,
         least_slip=least_slip,
+        turned=turned,
         peak_force=peak_force,
         peak_lateral=np.zeros(n_place),
         energy=np.zeros(6),
@@ -128,8 +131,14 @@ def lift_samples(whole: Floats, model: Model) -> None:
     if not model.sag.any():
         return
     if model.probe is not None:
-        whole[4 + 3 * model.n_place :] += model.probe.constant[:, np.newaxis]
+        whole[probe_part(model)] += model.probe.constant[:, np.newaxis]
     whole[:3] += model.output_sag[:, np.newaxis]
+
+
+def probe_part(model: Model) -> slice:
+    """Rows of `Samples.whole` that probes and monitors see."""
+    first = 4 + 3 * model.n_place
+    return slice(first, first + model.n_probe)
 
 
 def samples_within(samples: Samples, n_taken: int, limit: float) -> int:
@@ -144,15 +153,20 @@ def by_name(whole: Floats, model: Model) -> dict[str, Floats]:
     first_probe, n = 4 + 3 * model.n_place, whole.shape[1]
     axial, lateral, force = whole[4:first_probe].reshape(3, model.n_place, n)[:, : len(model.stators)]
     probes = () if model.probe is None else model.probe.probes
-    return {
-        "vertical": whole[VERTICAL],
-        "horizontal": whole[HORIZONTAL],
-        "torsion": whole[TWIST],
-        "torsion_acceleration": whole[TWIST_ACCELERATION],
-        "stator_axial": axial,
-        "stator_lateral": lateral,
-        "contact_force": force,
-    } | {f"{PROBE}{probe.name}": whole[first_probe + i] for i, probe in enumerate(probes)}
+    push = whole[probe_part(model).stop :].reshape(model.n_push, 4, n)
+    return (
+        {
+            "vertical": whole[VERTICAL],
+            "horizontal": whole[HORIZONTAL],
+            "torsion": whole[TWIST],
+            "torsion_acceleration": whole[TWIST_ACCELERATION],
+            "stator_axial": axial,
+            "stator_lateral": lateral,
+            "contact_force": force,
+        }
+        | {f"{PROBE}{probe.name}": whole[first_probe + i] for i, probe in enumerate(probes)}
+        | bore_signals(push)
+    )
 
 
 def probe_extents(signals: dict[str, Floats]) -> dict[str, float]:

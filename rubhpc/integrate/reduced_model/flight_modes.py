@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from rubhpc.fem.statics import sag_at_stators
+from rubhpc.integrate.packing import normal_laws
 from rubhpc.kernels._jit import plain
 from rubhpc.kernels.collocation.observing import Signals
 from rubhpc.kernels.collocation.structures import (
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
 NODES_HARD, NODES_SPRING = 4, 5
 LONGEST_PART = 128  # longest step: a revolution over this
 SHORTEST_LEVEL = 6  # ticks of the shortest step, as a power of two
+QUIET = 3e-4  # m/s2, of a rotor that bores catch, by the rounding of its displacement in the shortest step
 MOST_SLOTS = 16
 RESTING = 1e-9  # of the largest exponent: smaller sums of two exponents count as zero
 ENOUGH = 0.3  # of the accuracy: share of the foreshortening that may be missed
@@ -186,7 +188,14 @@ class FlightModes:
 
     def bodies(self, friction: float, clearance: Floats) -> Bodies:
         """Bodies and pairs of a case; clearance (q,) at rest, m."""
-        return self._bodies._replace(clearance=clearance, friction=np.full(clearance.size, friction))
+        stators, bodies = self.setup.model.stators, self._bodies
+        nearer = sag_at_stators(self.setup.model)[0]
+        is_bore = np.array([stator.is_bore for stator in stators])
+        return bodies._replace(
+            clearance=clearance,
+            radius=np.where(is_bore, -(clearance + nearer), bodies.radius),
+            friction=friction * np.array([stator.friction_factor for stator in stators]),
+        )
 
     @cached_property
     def _bodies(self) -> Bodies:
@@ -213,12 +222,10 @@ class FlightModes:
             radius=radius,
             clearance=np.zeros(q),
             aside=self.sense * sag_at_stators(setup.model)[1],
+            space=self._space,
             rim_speed=radius * abs(setup.spin),
             friction=np.zeros(q),
-            normal_law=np.full(q, law.normal_law),
-            stiffness=np.full(q, law.stiffness),
-            damping=np.full(q, law.damping),
-            restitution=np.full(q, law.restitution),
+            **normal_laws(setup.model, law),
             law=law,
             is_sticky=bool(plain(is_set_valued)(law)),
             is_varied=bool(plain(is_varied)(law)),
@@ -226,10 +233,17 @@ class FlightModes:
             displacement_limit=setup.displacement_limit,
         )
 
+    @property
+    def _space(self) -> Floats:
+        angle = np.array([stator.angle for stator in self.setup.model.stators])
+        c, s = np.cos(angle), np.sin(angle)
+        return np.array([[c, -self.sense * s], [s, self.sense * c]]).transpose(2, 0, 1).copy()
+
     @cached_property
     def nodes(self) -> Nodes:
         """Nodes of a step."""
-        return lobatto_nodes(NODES_HARD if self.setup.law.normal_law == LAGRANGE else NODES_SPRING)
+        is_hard = np.all(self._bodies.normal_law == LAGRANGE)
+        return lobatto_nodes(NODES_HARD if is_hard else NODES_SPRING)
 
     @cached_property
     def tables(self) -> Tables:
@@ -238,6 +252,9 @@ class FlightModes:
         turn = 2.0 * math.pi / abs(setup.spin)
         longest = math.floor(math.log2(turn / LONGEST_PART / setup.tick))
         first = max(SHORTEST_LEVEL, longest - MOST_SLOTS + 1)
+        if setup.model.rotor.softness:  # it rests metres away: shorter steps see the rounding of that
+            least = math.sqrt(np.finfo(float).eps * float(np.abs(setup.model.sag).max()) / QUIET)
+            first = min(max(first, math.ceil(math.log2(least / setup.tick))), longest)
         k, n_y, n_x = longest - first + 1, (2 * s - 1) * n_row, self.motion.shape[1]
         return Tables(
             first_level=first,

@@ -170,6 +170,9 @@ def reduce_to(
     keep = np.flatnonzero(_visible(np.vstack([basis[seen], patterns.T @ basis]), stiffness, damping))
     basis, pick = basis[:, keep], np.ix_(keep, keep)
     at_contacts = np.where((degree >= 0)[:, :, None], basis[np.maximum(degree, 0)], 0.0)
+    for i, (first, stator) in enumerate(zip(model.stator_start, model.stators, strict=True)):
+        if stator.torsion >= 0:  # the wall of a bore that turns slides along with the rim
+            at_contacts[i, TORSION] -= basis[first + stator.torsion]
     if free_spin is not None:
         at_contacts[:, TORSION] -= free_spin.share @ basis[: free_spin.share.size]
     return ReducedModel(

@@ -12,7 +12,13 @@ from scipy.linalg import eigh
 
 from rubhpc.errors import InputError
 from rubhpc.fem.statics import find_rigid_body_mode, unheld_message
-from rubhpc.integrate.packing import carrier_degrees, degrees_of, output_degrees, whole_system
+from rubhpc.integrate.packing import (
+    carrier_degrees,
+    degrees_of,
+    normal_laws,
+    output_degrees,
+    whole_system,
+)
 from rubhpc.integrate.reduced_model.coupling import Grouped, coupled_parts
 from rubhpc.kernels._jit import plain
 from rubhpc.kernels.accumulators import TWIST
@@ -95,8 +101,10 @@ def at_standstill(model: Model) -> Standstill:
         else:
             square, shape = eigh(symmetric[pick], mass[pick])
         if square[0] <= FREE * square[-1]:
-            free = find_rigid_body_mode(model) or "here one is free to move or to turn"
-            raise InputError(unheld_message(free))
+            free = find_rigid_body_mode(model)
+            if free or not model.rotor.softness:
+                raise InputError(unheld_message(free or "here one is free to move or to turn"))
+            square = np.maximum(square, model.rotor.softness)  # which rounding hides
         mode = np.zeros((mass.shape[0], rows.size))
         mode[rows] = shape
         n_seen = is_seen[rows].sum() + looked_at[rows].any(axis=0).sum()
@@ -157,7 +165,7 @@ def _contact_frequency(parts: list[Part], degree: Ints, model: Model) -> float:
         response = along / square  # to a unit force, mode by mode
         inertia = (response @ response) / (along @ response) ** 2  # of that shape, as that of the first mode
         compliance = mode[axial] @ (mode[axial] / square)
-        if stator.alone is not None:  # an impact acts on the stator before the carrier moves
+        if stator.held.axial >= 0 and stator.alone is not None:  # it acts before the carrier moves
             tip = stator.alone.axial
             compliance = np.linalg.inv(stator.alone.body.stiffness)[tip, tip]
         highest = max(highest, 1.0 / np.sqrt(inertia * compliance))
@@ -214,8 +222,13 @@ SMOOTH = Touch()
 def touch_of(model: Model, law: Law, *, is_updated: bool) -> Touch:
     """Sensitivity of contacts under a law, with the updated or the fixed normal."""
     is_bent = any(stator.squared_slope is not None for stator in model.stators)
-    curved, bounces = is_updated or is_bent, law.restitution > 0.0
-    return Touch(plain(is_set_valued)(law), curved, law.stiffness, law.damping, bounces)
+    laws = normal_laws(model, law)
+    bounces, is_soft = bool(laws["restitution"].any()), bool(np.all(laws["stiffness"] > 0.0))
+    spring, damper = 0.0, 0.0
+    if is_soft:
+        stiffest = laws["stiffness"].argmax()
+        spring, damper = float(laws["stiffness"][stiffest]), float(laws["damping"][stiffest])
+    return Touch(plain(is_set_valued)(law), is_updated or is_bent, spring, damper, bounces)
 
 
 class Ringing(NamedTuple):
@@ -319,9 +332,9 @@ def ringing_of(model: Model, spin: float, touch: Touch) -> Ringing:
     rungs: list[Floats] = []
     probed: list[Floats] = []
     impact, raised = 0.0, np.ones(frequency.size)
-    for stator, degree in zip(model.stators, degrees_of(model), strict=True):
-        v, w, twist, axial, lateral = (mode[row] if row >= 0 else np.zeros(frequency.size) for row in degree)
-        ey, ez = np.cos(stator.angle), np.sin(stator.angle)
+    contacts = contact_motions(model, mode)
+    for angle, radius, (v, w, twist, axial, lateral) in contacts:
+        ey, ez = np.cos(angle), np.sin(angle)
         across = ey * v + ez * w
         impact = max(impact, struck_share(across, axial, frequency))
         pulse = pulse_spectrum(across, axial, frequency, standstill.contact_frequency)
@@ -330,7 +343,7 @@ def ringing_of(model: Model, spin: float, touch: Touch) -> Ringing:
             bounced = pulse_spectrum(across, axial, frequency, standstill.contact_frequency, bounce)
             raised = np.maximum(raised, bounced / pulse)
         rung, seen = (of * pulse / frequency for of in (np.array([*signals, axial, lateral]), lively))
-        along = lateral + ez * v - ey * w - stator.radius * twist
+        along = lateral + ez * v - ey * w - radius * twist
         still = np.zeros(frequency.size)
         moved = across**2 + axial**2
         by_normal, by_friction = [moved * pulse], [still]  # amplitudes in gaps and slip
@@ -346,13 +359,28 @@ def ringing_of(model: Model, spin: float, touch: Touch) -> Ringing:
         probed.extend([seen * (axial - across), seen * along])
     coupled = coupled_ringing(damping, frequency) ** 2
     share, lively_share = (
-        shares(np.vstack(those), len(model.stators), coupled, lasting * raised) for those in (rungs, probed)
+        shares(np.vstack(those), len(contacts), coupled, lasting * raised) for those in (rungs, probed)
     )
     # An event that is late by a share of the contact's duration shifts the phase of fast modes more.
     ratio = frequency / standstill.contact_frequency
     is_fast = ratio > CUTOFF_RATIO
     late = float((lively_share[:, is_fast] @ ratio[is_fast] ** 2).max(initial=1.0))
     return Ringing(np.vstack([share * late, lively_share]), impact)
+
+
+def contact_motions(model: Model, mode: Floats) -> list[tuple[float, float, Floats]]:
+    """Angle and radius (m) of each contact, and what the modes (n_all, n) move there (5, n), as `degrees_of`.
+
+    A bore is met above and beside the rotor.
+    """
+    found = []
+    for stator, rows in zip(model.stators, degrees_of(model), strict=True):
+        moved = np.where((rows >= 0)[:, None], mode[rows], 0.0)
+        found.append((stator.angle, stator.radius, moved))
+        if stator.is_bore:
+            v, w, twist, up, aside = moved
+            found.append((math.pi / 2, stator.radius, np.array([v, w, twist, aside, -up])))
+    return found
 
 
 def shares(rung: Floats, n_stator: int, coupled: Floats, lasting: Floats) -> Floats:

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.collocation.gaps import see_gap
-from rubhpc.kernels.collocation.structures import (  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.collocation.structures import (
+    TWIST,
     Bodies,
     CaseState,
     Solution,
@@ -31,6 +32,29 @@ RARELY = 0.05  # of the time since it has opened
 
 
 @linked_sum
+def time_in_bore(
+    gap: float, rate: float, sideways: float, distance: float, bound: float, free: float
+) -> float:
+    """Time (s) for which a bore surely stays open, at most `free`, that of a gap which is not curved.
+
+    The centres move apart along a straight line, with the rate of the gap and `sideways` (m/s), and deviate
+    by no more than half the `bound` (m/s2) times the time squared. What is then left of the gap is a concave
+    function of the time: Newton's method comes to its root from above, and the chord is below it.
+    """
+    left, square = 0.0, rate * rate + sideways * sideways
+    for _ in range(4):
+        along, aside = distance - rate * free, sideways * free
+        reach = math.sqrt(along * along + aside * aside)
+        left = gap + free * (2.0 * distance * rate - square * free) / (distance + reach)
+        left -= 0.5 * bound * free * free
+        if left >= 0.0:
+            return free
+        slope = (distance * rate - square * free) / reach - bound * free
+        held, free = free, free - left / slope
+    return held * gap / (gap - left)
+
+
+@linked_sum
 def fly(
     bodies: Bodies,
     power: Complexes,
@@ -45,7 +69,8 @@ def fly(
     """Advance with all pairs open to the first touch, or to `last_tick`.
 
     A gap is a convex function of the local motions, so that it stays above its tangent less half of a bound
-    of its acceleration times the time squared. The first ticks `unseen` are taken without a look.
+    of its acceleration times the time squared; for a bore see `time_in_bore`. The first ticks `unseen` are
+    taken without a look.
 
     Returns
     -------
@@ -101,14 +126,21 @@ def fly(
         for i in range(q):
             first = i * n_local
             see_gap(bodies, i, start, first, i * s, solution)
-            gap, rate, bound = solution.gap[i * s], 0.0, 0.0
+            gap, rate, bound, is_bore = solution.gap[i * s], 0.0, 0.0, bodies.radius[i] < 0.0
             for a in range(n_local):
                 slope, row, total = solution.normal[i * s, a], bend[first + a], 0.0
-                if slope != 0.0:
+                weight = 1.0 if is_bore and a < TWIST else abs(slope)  # the normal of a bore may turn
+                if weight != 0.0:
                     for k in range(n_mode):
                         total += row[k] * size[k]
                     rate += slope * start[n_row + first + a]
-                    bound += abs(slope) * total
+                    bound += weight * total
+            sideways, distance, sharpest = 0.0, 0.0, bound
+            if is_bore:
+                for a in range(TWIST):
+                    sideways += solution.tangent[i * s, a] * start[n_row + first + a]
+                distance = -1.0 / solution.curvature[i * s]
+                sharpest += sideways * sideways / distance
             if solution.turned[RATE_BEFORE, i] < 0.0 <= rate and tick > solution.looked[0]:
                 passed = (tick - solution.looked[0]) * tick_length
                 before = solution.turned[GAP_BEFORE, i], solution.turned[RATE_BEFORE, i]
@@ -117,7 +149,7 @@ def fly(
             solution.turned[GAP_BEFORE, i], solution.turned[RATE_BEFORE, i] = gap, rate
             soft = bodies.damping[i] / bodies.stiffness[i] if bodies.normal_law[i] == PENALTY else 0.0
             near = gap + soft * max(rate, 0.0)
-            least = math.sqrt(2.0 * GAP_TOLERANCE / bound)
+            least = math.sqrt(2.0 * GAP_TOLERANCE / sharpest)
             age = (tick - case.since[i]) * tick_length
             if age < RECENT * case.lasting[i]:
                 least = max(least, RARELY * age)
@@ -126,7 +158,7 @@ def fly(
                 back = -int(gap / (rate * tick_length)) if gap < 0.0 and rate < 0.0 else 0
                 back = max(back, -((tick - open_at) // 2))  # halves: Newton's method may pass the gap
                 if back == 0:
-                    return tick, i, bound, n_look
+                    return tick, i, sharpest, n_look
                 # From the last look: back in time, modes that decay fast would overflow.
                 for k in range(x.size):
                     x[k] = solution.held[k]
@@ -134,10 +166,12 @@ def fly(
                 tick = open_at
                 break
             if gap <= 0.0:  # closed as yet, and opening: while the rate surely stays positive
-                free = max(least, rate / bound)
+                free = max(least, rate / sharpest)
             else:
                 root = math.sqrt(rate * rate + 2.0 * bound * gap)
                 free = (root + rate) / bound if rate > 0.0 else 2.0 * gap / (root - rate)
+                if is_bore:
+                    free = time_in_bore(gap, rate, sideways, distance, bound, free)
                 is_close = rate < 0.0 and bound * gap < 0.5 * rate * rate
                 if not is_close:
                     free = max(least, free)

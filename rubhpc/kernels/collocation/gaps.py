@@ -2,6 +2,9 @@
 
 A gap gives its normal, the slope of the gap `J_n`, and its tangent `J_t`. Loads on the local motions are
 `N J_n + T J_t`, and the slip is `rim speed - J_t q'`. Another smooth gap is another branch of `see_gap`.
+
+A round rim of radius R meets a tip at the distance `reach` from its centre: the gap is `reach - R`. A bore of
+the clearance c is a rim of the radius -c at the negative distance, so that the gap is `c - distance`.
 """
 
 from __future__ import annotations
@@ -24,6 +27,14 @@ from rubhpc.kernels.collocation.structures import (
 
 Floats = NDArray[np.float64]
 
+CENTRED = 1e-30  # m, least distance from the centre of a bore: there any direction is the normal
+
+
+@linked_sum
+def reach_of(radius: float, line: float, across: float) -> float:
+    """Distance of a tip from the centre of the rim, m, with the sign of the radius."""
+    return math.copysign(max(math.sqrt(line * line + across * across), CENTRED), radius)
+
 
 @linked_sum
 def gap_of(bodies: Bodies, i: int, q: Floats, first: int) -> float:
@@ -34,7 +45,7 @@ def gap_of(bodies: Bodies, i: int, q: Floats, first: int) -> float:
     along = bodies.clearance[i] + q[first + ALONG] + 0.5 * bent
     if bodies.kind[i] == ROUND:
         across, radius = bodies.aside[i] + q[first + ACROSS], bodies.radius[i]
-        reach = math.sqrt((radius + along) * (radius + along) + across * across)
+        reach = reach_of(radius, radius + along, across)
         along = ((2.0 * radius + along) * along + across * across) / (reach + radius)
     return float(along)
 
@@ -50,9 +61,11 @@ def see_gap(bodies: Bodies, i: int, q: Floats, first: int, row: int, solution: S
     gap, curvature, n_along, n_across = along, 0.0, 1.0, 0.0
     if bodies.kind[i] == ROUND:
         across, radius = bodies.aside[i] + q[first + ACROSS], bodies.radius[i]
-        reach = math.sqrt((radius + along) * (radius + along) + across * across)
+        reach = reach_of(radius, radius + along, across)
         curvature = 1.0 / reach
         n_along, n_across = (radius + along) * curvature, across * curvature
+        if abs(reach) <= CENTRED:
+            n_along, n_across = 1.0, 0.0
         # Without the difference of reach and radius, which has lost half of the digits.
         gap = ((2.0 * radius + along) * along + across * across) / (reach + radius)
     normal, tangent = solution.normal[row], solution.tangent[row]

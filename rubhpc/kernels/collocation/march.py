@@ -133,9 +133,19 @@ def hold_forces(force: Floats, guess: Floats) -> None:
 
 @linked_sum
 def error_of(
-    nodes: Nodes, state: Ints, before: Floats, guess: Floats, is_continued: bool, noise: float
+    bodies: Bodies,
+    nodes: Nodes,
+    state: Ints,
+    before: Floats,
+    guess: Floats,
+    is_continued: bool,
+    noise: float,
+    solution: Solution,
 ) -> float:
-    """Estimated error of the forces of a step, N: by their last coefficients, and the jump between steps."""
+    """Estimated error of the forces of a step, N: by their last coefficients, and the jump between steps.
+
+    A force in a bore may be constant and turn: its components count too.
+    """
     s, error = nodes.at.size, 0.0
     for i in range(state.size):
         if state[i] == OPEN:
@@ -147,6 +157,12 @@ def error_of(
             error = max(error, 0.1 * abs(last))
             if is_continued:
                 error = max(error, 0.5 * abs(guess[i, f, 0] - before[i, f, s - 1]))
+        if bodies.radius[i] < 0.0:
+            for a in range(2):
+                last = 0.0
+                for k in range(s):
+                    last += nodes.legendre[s - 1, k] * guess[i, NORMAL, k] * solution.unit[i * s + k, a]
+                error = max(error, 0.1 * abs(last))
     return max(0.0, error - 30.0 * noise)
 
 
@@ -560,7 +576,16 @@ def advance_by_collocation(
                 pivots[0] = max(pivots[0], abs(n_iteration))
             if n_iteration > 0:
                 is_continued = memory.length > 0 and memory.part == 1.0
-                error = error_of(nodes, state, case.force, solution.guess, is_continued, solution.noise[slot])
+                error = error_of(
+                    bodies,
+                    nodes,
+                    state,
+                    case.force,
+                    solution.guess,
+                    is_continued,
+                    solution.noise[slot],
+                    solution,
+                )
                 error *= min(1.0, step / AVERAGED)
                 for i in range(state.size):
                     if state[i] != OPEN:

@@ -6,6 +6,8 @@ are polynomials through their values at the nodes, and their rates at both ends;
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -416,7 +418,14 @@ def record_contact(
         if i_sample < samples.force.shape[1]:
             impulse = step * integral_of(nodes, n, done / ticks, until / ticks)
             samples.force[i, i_sample] += impulse / interval
+            if samples.push.shape[0] > 0:
+                for k in range(4):
+                    fill_push(bodies, s, i, k, n, t, solution, part)
+                    impulse = step * integral_of(nodes, part, done / ticks, until / ticks)
+                    samples.push[i, k, i_sample] += impulse / interval
         done = until
+    if bodies.radius[i] < 0.0:
+        accumulator.turned[i] += turn_of(nodes, i, share, solution, part)
     whole = step * integral_of(nodes, n, 0.0, share)
     accumulator.contact_time[i] += length
     accumulator.impulse[i] += whole
@@ -457,6 +466,38 @@ def record_contact(
 
 
 @linked_sum
+def push_of(bodies: Bodies, i: int, row: int, k: int, n: float, t: float, solution: Solution) -> float:
+    """Item k of `Samples.push` of pair i by its forces n and t, N, in a row of the solution."""
+    along, across = n * solution.unit[row, 0], n * solution.unit[row, 1]
+    if k >= 2:
+        along, across = along - t * solution.unit[row, 1], across + t * solution.unit[row, 0]
+    return float(bodies.space[i, k % 2, 0] * along + bodies.space[i, k % 2, 1] * across)
+
+
+@linked_sum
+def fill_push(
+    bodies: Bodies, s: int, i: int, k: int, n: Floats, t: Floats, solution: Solution, part: Floats
+) -> None:
+    """Fill `part` (s,) with it at the nodes, by the forces (s,) there."""
+    for j in range(s):
+        part[j] = push_of(bodies, i, i * s + j, k, n[j], t[j], solution)
+
+
+@linked_sum
+def turn_of(nodes: Nodes, i: int, share: float, solution: Solution, part: Floats) -> float:
+    """Angle, rad, by which the normal of pair i turns in a part of a step."""
+    s = nodes.at.size
+    for k in range(s):
+        part[k] = solution.unit[i * s + k, 0]
+    along = value_at(nodes, part, share)
+    for k in range(s):
+        part[k] = solution.unit[i * s + k, 1]
+    across = value_at(nodes, part, share)
+    a, b = solution.unit[i * s, 0], solution.unit[i * s, 1]
+    return math.atan2(a * across - b * along, a * along + b * across)
+
+
+@linked_sum
 def record_impulses(
     bodies: Bodies, s: int, clock: Clock, progress: Progress, solution: Solution, seen: Seen
 ) -> None:
@@ -473,6 +514,8 @@ def record_impulses(
         slip = 0.5 * (before + after)
         if i_sample < samples.force.shape[1]:
             samples.force[i, i_sample] += n / interval
+            for k in range(4 if samples.push.shape[0] > 0 else 0):
+                samples.push[i, k, i_sample] += push_of(bodies, i, i * s, k, n, t, solution) / interval
         accumulator.impulse[i] += n
         observe_force(i, progress.tick * clock.tick, 0.0, n, 0.0, 0.0, accumulator)
         accumulator.least_slip[i] = min(accumulator.least_slip[i], before, after)

@@ -13,6 +13,7 @@ import math
 from typing import Protocol
 
 import numpy as np
+from numba import config
 from numpy.typing import NDArray
 
 from rubhpc.kernels._struct import Struct
@@ -23,7 +24,7 @@ Complexes = NDArray[np.complex128]
 Ints = NDArray[np.int64]
 
 ALONG, ACROSS, TWIST, BENDING = range(4)
-FIXED, ROUND = range(2)  # gap: along the axis of the stator, or along the line of centres
+FIXED, ROUND = range(2)  # gap: along the axis of the stator, or along the line of centres, also of a bore
 OPEN, FORWARD, BACKWARD, STICKING = 0, 1, -1, 2  # state of a pair; slip is positive in steady sliding
 NORMAL, FRICTION = range(2)  # force of a pair, and event of a pair
 JAMMED, UNCONVERGED, ENDLESS, SINGULAR = range(1, 5)  # why a case cannot continue (`Memory.why`)
@@ -53,9 +54,10 @@ class Bodies(Struct):
     bend: Floats  # (R, nm), bound on the acceleration of a local motion by a unit mode, 1/s2
     compliance: Floats  # (R, R), acceleration of a local motion by a unit load, 1/kg
     kind: Ints  # (q,), FIXED or ROUND
-    radius: Floats  # (q,), of the rim, m
+    radius: Floats  # (q,), of the rim, m; of a bore its clearance, negative
     clearance: Floats  # (q,), along the axis at rest, m
     aside: Floats  # (q,), of the tip at rest from the axis through the disc, m
+    space: Floats  # (q, 2, 2), up and horizontally (rows), of what is along the axis and across it
     rim_speed: Floats  # (q,), m/s, not negative
     friction: Floats  # (q,), coefficient
     normal_law: Ints  # (q,), of `laws.NORMAL_LAWS`
@@ -176,7 +178,8 @@ _RECORD = np.dtype(
 
 def new_memory() -> NDArray[np.void]:
     """Numbers (1,) of a case that begins."""
-    return np.zeros(1, _RECORD)
+    memory = np.zeros(1, _RECORD)
+    return memory.view(np.recarray) if config.DISABLE_JIT else memory  # type: ignore[attr-defined]
 
 
 def _lobatto(s: int) -> Floats:

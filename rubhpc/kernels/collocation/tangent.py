@@ -327,9 +327,9 @@ def fill_kicks(bodies: Bodies, s: int, least: float, solution: Solution, trail: 
         i, a = (r % n_row) // n_local, r % n_local
         if not solution.touching[i]:
             continue
-        size = DIFFERENCE * (bodies.radius[i] if r < n_row else fastest)
+        size = DIFFERENCE * (abs(bodies.radius[i]) if r < n_row else fastest)
         if r < n_row and a > TWIST:
-            size = DIFFERENCE * math.sqrt(bodies.radius[i])
+            size = DIFFERENCE * math.sqrt(abs(bodies.radius[i]))
         held = start[r]
         for sense in (-1.0, 1.0):
             start[r] = held + sense * size

@@ -36,7 +36,8 @@ class Curve:
             revolutions=[SimpleNamespace(least_gap=least, least_force=np.array([np.inf]))],
             pieces=[],
             case=SimpleNamespace(
-                q=1, setup=SimpleNamespace(spin=1.0), bodies=SimpleNamespace(clearance=np.ones(1)),
+                q=1, bodies=SimpleNamespace(clearance=np.ones(1)),
+                setup=SimpleNamespace(spin=1.0, model=SimpleNamespace(stators=())),
                 tolerances=TO_ROUNDING,
             ),
         )  # fmt: skip
