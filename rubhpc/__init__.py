@@ -67,12 +67,9 @@ __all__ = [
     "Unbalance",
     "assemble",
     "branch",
-<<<<<<< HEAD
-    "identify",
-=======
     "certify_whirl",
     "dry_whirl",
->>>>>>> main
+    "identify",
     "least_knock",
     "linear_design",
     "measured",
@@ -113,12 +110,9 @@ _HOMES = {
     "Unbalance": "rubhpc.rig.rotors:Unbalance",
     "assemble": "rubhpc.fem.assemble:assemble",
     "branch": "rubhpc.branch:branch",
-<<<<<<< HEAD
-    "identify": "rubhpc.identification.identify:identify",
-=======
     "certify_whirl": "rubhpc.whirl_simulations:certify_whirl",
     "dry_whirl": "rubhpc.fem.dry_whirl:dry_whirl",
->>>>>>> main
+    "identify": "rubhpc.identification.identify:identify",
     "least_knock": "rubhpc.knocks:least_knock",
     "linear_design": "rubhpc.fem.linear_design:linear_design",
     "measured": "postproc.measured.measured:measured",

@@ -112,6 +112,17 @@ def test_a_clearance_that_may_be_wide_does_not_hide_a_healthy_machine(tmp_path):
     assert "it is probably no rub" in text
 
 
+def test_slack_bearings_take_the_place_of_springs(tmp_path):
+    files = rubbing_machine.write(tmp_path, rubbing_machine.linear(False, 40, 0.05))
+    problem = read_problem(*files, slack=True)
+    assert [other.name for other in problem.others[2:]] == [f"slack bearing at node {n}" for n in (1, 15)]
+    rig = problem.others[2].machine.study.rig
+    assert [bearing.stiffness_matrix[0][0] for bearing in rig.rotor.bearing] == pytest.approx([1e3, 1e6])
+    (wall,) = rig.stator
+    assert (wall.node, wall.law.stiffness) == (1, pytest.approx(1e6))
+    assert [prior.name for prior in problem.others[2].priors] == ["clearance"]  # none of the rotor is open
+
+
 def test_a_speed_that_is_known_roughly_is_refined(tmp_path):
     columns = rubbing_machine.linear(True, 40, 0.05)
     del columns["key_phasor"]
