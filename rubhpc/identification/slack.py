@@ -17,6 +17,7 @@ from rubhpc.identification.candidates import Machine, Rub
 from rubhpc.identification.priors import read_prior
 from rubhpc.rig.normal_law import NormalLaw
 from rubhpc.rig.parts import Bearing
+from rubhpc.rig.rotors import Rotor
 from rubhpc.rig.stators import Bore
 from rubhpc.study.axis_reading import make_axis
 from rubhpc.study.contact_keys import Contact
@@ -34,12 +35,15 @@ _RADIUS = 0.01  # m, which matters to friction alone
 def slack_bearings(machine: Machine, comparison: Comparison) -> Iterator[Rub]:
     """Yield a hypothesis for each bearing of the rotor on springs that stands on the ground."""
     rig, file = machine.study.rig, "slack bearing"
+    if not isinstance(rig.rotor, Rotor):  # others have tables alone
+        return
     spin = machine.channels.spin
     deflection = contact_free_amplitude(model_at(assemble(rig), spin), spin)
-    bearings = getattr(rig.rotor, "bearing", ())
+    bearings = rig.rotor.bearing
     for i, bearing in enumerate(bearings):
         if not isinstance(bearing, Bearing) or bearing.pedestal is not None:
             continue
+        assert bearing.node is not None  # a rotor places them
         (kyy, _), (_, kzz) = bearing.stiffness_matrix
         stiffness = math.sqrt(kyy * kzz)
         if not stiffness:
