@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from rubhpc.identification.comparison import Comparison
+    from rubhpc.rig.bearing_table import AnyBearing
 
 _LEFT = 1e-3  # of the bearing's springs
 _CLEARANCE = (0.03, 3.0)  # over the largest deflection that was measured, or is due without contact
@@ -36,21 +37,19 @@ def slack_bearings(machine: Machine, comparison: Comparison) -> Iterator[Rub]:
     rig, file = machine.study.rig, "slack bearing"
     spin = machine.channels.spin
     deflection = contact_free_amplitude(model_at(assemble(rig), spin), spin)
-    bearings = getattr(rig.rotor, "bearing", ())
+    bearings: tuple[AnyBearing, ...] = getattr(rig.rotor, "bearing", ())
     for i, bearing in enumerate(bearings):
         if not isinstance(bearing, Bearing) or bearing.pedestal is not None:
             continue
         (kyy, _), (_, kzz) = bearing.stiffness_matrix
-        stiffness = math.sqrt(kyy * kzz)
-        if not stiffness:
+        stiffness, node = math.sqrt(kyy * kzz), bearing.node
+        if not stiffness or node is None:
             continue
         (cyy, cyz), (czy, czz) = bearing.damping_matrix
-        loose = Bearing(
-            node=bearing.node, kyy=_LEFT * kyy, kzz=_LEFT * kzz, cyy=cyy, cyz=cyz, czy=czy, czz=czz
+        loose: AnyBearing = Bearing(
+            node=node, kyy=_LEFT * kyy, kzz=_LEFT * kzz, cyy=cyy, cyz=cyz, czy=czy, czz=czz
         )
-        wall = Bore(
-            node=bearing.node, rigid=True, radius=_RADIUS, law=NormalLaw(kind="penalty", stiffness=stiffness)
-        )
+        wall = Bore(node=node, rigid=True, radius=_RADIUS, law=NormalLaw(kind="penalty", stiffness=stiffness))
         rotor = replace(rig.rotor, bearing=(*bearings[:i], loose, *bearings[i + 1 :]))
         slack = replace(rig, rotor=rotor, stator=(wall,))
         low, high = (share * deflection for share in _CLEARANCE)
@@ -72,5 +71,5 @@ def slack_bearings(machine: Machine, comparison: Comparison) -> Iterator[Rub]:
                 priors=priors,
             ),
             comparison=comparison,
-            name=f"slack bearing at node {bearing.node}",
+            name=f"slack bearing at node {node}",
         )
