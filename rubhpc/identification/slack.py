@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rubhpc.fem.assemble import assemble, model_at
 from rubhpc.fem.response import contact_free_amplitude
@@ -46,11 +46,10 @@ def slack_bearings(machine: Machine, comparison: Comparison) -> Iterator[Rub]:
         if not stiffness or node is None:
             continue
         (cyy, cyz), (czy, czz) = bearing.damping_matrix
-        loose: AnyBearing = Bearing(
-            node=node, kyy=_LEFT * kyy, kzz=_LEFT * kzz, cyy=cyy, cyz=cyz, czy=czy, czz=czz
-        )
+        loose = Bearing(node=node, kyy=_LEFT * kyy, kzz=_LEFT * kzz, cyy=cyy, cyz=cyz, czy=czy, czz=czz)
         wall = Bore(node=node, rigid=True, radius=_RADIUS, law=NormalLaw(kind="penalty", stiffness=stiffness))
-        rotor = replace(rig.rotor, bearing=(*bearings[:i], loose, *bearings[i + 1 :]))
+        changed: Any = (*bearings[:i], loose, *bearings[i + 1 :])
+        rotor = replace(rig.rotor, bearing=changed)
         slack = replace(rig, rotor=rotor, stator=(wall,))
         low, high = (share * deflection for share in _CLEARANCE)
         own = tuple(prior for prior in machine.priors if prior.name.startswith("rotor."))
