@@ -37,7 +37,7 @@ import click
     show_default=True,
     help="Scheme of the truth.",
 )
-@click.option("--transient", type=click.IntRange(min=1), default=100, show_default=True, help="Of the truth.")
+@click.option("--transient", type=click.IntRange(min=1), default=400, show_default=True, help="Of the truth.")
 @click.option(
     "--revolutions", type=click.IntRange(min=26), default=32, show_default=True, help="That are measured."
 )

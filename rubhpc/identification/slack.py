@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rubhpc.fem.assemble import assemble, model_at
 from rubhpc.fem.response import contact_free_amplitude
@@ -17,7 +17,6 @@ from rubhpc.identification.candidates import Machine, Rub
 from rubhpc.identification.priors import read_prior
 from rubhpc.rig.normal_law import NormalLaw
 from rubhpc.rig.parts import Bearing
-from rubhpc.rig.rotors import Rotor
 from rubhpc.rig.stators import Bore
 from rubhpc.study.axis_reading import make_axis
 from rubhpc.study.contact_keys import Contact
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from rubhpc.identification.comparison import Comparison
+    from rubhpc.rig.bearing_table import AnyBearing
 
 _LEFT = 1e-3  # of the bearing's springs
 _CLEARANCE = (0.03, 3.0)  # over the largest deflection that was measured, or is due without contact
@@ -35,27 +35,21 @@ _RADIUS = 0.01  # m, which matters to friction alone
 def slack_bearings(machine: Machine, comparison: Comparison) -> Iterator[Rub]:
     """Yield a hypothesis for each bearing of the rotor on springs that stands on the ground."""
     rig, file = machine.study.rig, "slack bearing"
-    if not isinstance(rig.rotor, Rotor):  # others have tables alone
-        return
     spin = machine.channels.spin
     deflection = contact_free_amplitude(model_at(assemble(rig), spin), spin)
-    bearings = rig.rotor.bearing
+    bearings: tuple[AnyBearing, ...] = getattr(rig.rotor, "bearing", ())
     for i, bearing in enumerate(bearings):
         if not isinstance(bearing, Bearing) or bearing.pedestal is not None:
             continue
-        assert bearing.node is not None  # a rotor places them
         (kyy, _), (_, kzz) = bearing.stiffness_matrix
-        stiffness = math.sqrt(kyy * kzz)
-        if not stiffness:
+        stiffness, node = math.sqrt(kyy * kzz), bearing.node
+        if not stiffness or node is None:
             continue
         (cyy, cyz), (czy, czz) = bearing.damping_matrix
-        loose = Bearing(
-            node=bearing.node, kyy=_LEFT * kyy, kzz=_LEFT * kzz, cyy=cyy, cyz=cyz, czy=czy, czz=czz
-        )
-        wall = Bore(
-            node=bearing.node, rigid=True, radius=_RADIUS, law=NormalLaw(kind="penalty", stiffness=stiffness)
-        )
-        rotor = replace(rig.rotor, bearing=(*bearings[:i], loose, *bearings[i + 1 :]))
+        loose = Bearing(node=node, kyy=_LEFT * kyy, kzz=_LEFT * kzz, cyy=cyy, cyz=cyz, czy=czy, czz=czz)
+        wall = Bore(node=node, rigid=True, radius=_RADIUS, law=NormalLaw(kind="penalty", stiffness=stiffness))
+        changed: Any = (*bearings[:i], loose, *bearings[i + 1 :])
+        rotor = replace(rig.rotor, bearing=changed)
         slack = replace(rig, rotor=rotor, stator=(wall,))
         low, high = (share * deflection for share in _CLEARANCE)
         own = tuple(prior for prior in machine.priors if prior.name.startswith("rotor."))
@@ -76,5 +70,5 @@ def slack_bearings(machine: Machine, comparison: Comparison) -> Iterator[Rub]:
                 priors=priors,
             ),
             comparison=comparison,
-            name=f"slack bearing at node {bearing.node}",
+            name=f"slack bearing at node {node}",
         )
