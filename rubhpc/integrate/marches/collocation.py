@@ -89,7 +89,7 @@ class CollocationMarch(ModalMarch):
         """Take the modes of a set-up."""
         self._modes = setup.flight_modes
         self._contacts = self._modes.bodies(self._friction, self._clearance)
-        sizes = self._modes.tables.free.shape, self._modes.n_local
+        sizes = self._modes.tables.free.shape, self._modes.n_local, self._modes.exponent.size
         if sizes != self._sizes:
             self._sizes, self._solution, self._seen = sizes, self._new_solution(), None
 
