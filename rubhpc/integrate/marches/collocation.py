@@ -89,7 +89,7 @@ class CollocationMarch(ModalMarch):
         """Take the modes of a set-up."""
         self._modes = setup.flight_modes
         self._contacts = self._modes.bodies(self._friction, self._clearance)
-        sizes = self._modes.tables.free.shape, self._modes.n_local
+        sizes = self._modes.tables.free.shape, self._modes.n_local, self._modes.exponent.size
         if sizes != self._sizes:
             self._sizes, self._solution, self._seen = sizes, self._new_solution(), None
 
@@ -373,6 +373,7 @@ class CollocationMarch(ModalMarch):
         n_x, s, n_row = self._case.x.size, modes.nodes.at.size, len(modes.local)
         return Trail(
             columns=np.array(columns, order="C"),
+            delay=np.zeros(columns.shape[1]),
             event=np.zeros((n_event, 4), dtype=np.int64),
             tick=np.zeros(n_event, dtype=np.int64),
             approach=np.full(n_event + 1, np.nan),
@@ -384,6 +385,6 @@ class CollocationMarch(ModalMarch):
             column=np.zeros(n_x),
             after=np.zeros(n_x),
             load=np.zeros(s * n_row),
-            rates=np.zeros((2, n_x)),
+            rates=np.zeros(n_x),
             kick=np.zeros((2 * n_row, n_x)),
         )

@@ -68,6 +68,7 @@ from rubhpc.kernels.collocation.tangent import (
     carry_event,
     carry_freely,
     carry_step,
+    make_up,
     note_event,
     note_least,
 )
@@ -430,13 +431,11 @@ def advance_by_collocation(
                 is_release = kind == NORMAL and trail.state[pair] != OPEN
                 is_carried = True
                 if kind == FRICTION and trail.state[pair] == STICKING:
-                    is_carried = carry_breakaway(bodies, s, x, state, pair, solution, trail)
+                    is_carried = carry_breakaway(bodies, s, pair, solution, trail)
                 elif not is_release:
                     is_carried = carry_event(
                         bodies,
                         s,
-                        x,
-                        state,
                         pair,
                         kind,
                         memory.least,
@@ -711,6 +710,9 @@ def advance_by_collocation(
             seen,
         )
         todo, trial = TRYING, -1
+    if trail is not None and not make_up(bodies, s, x, state, solution, trail):
+        memory.why = SINGULAR
+        return CONTACT_UNSOLVED
     is_last = progress.tick == clock.n_sample << clock.sample_level
     if is_recorded and is_last and progress.tick == progress.next_sample << clock.sample_level:
         see_start(bodies, x, solution)

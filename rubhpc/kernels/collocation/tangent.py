@@ -2,11 +2,13 @@
 
 Columns (nx, k) are changes of the coordinates. In a step they follow from its equations, linearised where
 they are solved. An event comes earlier or later where the state changes: with the rates f of the coordinates
-before and after it, and the impulse P of the state at the event,
+before it, and the impulse P of the state at the event,
 
-    dx+ = dx + (f- - f+) dt + dP(dq + q' dt),    dt = -de / e',
+    dx+ = dx + f- dt + dP(dq + q' dt),    dt = -de / e',
 
-where e is the event function.
+where e is the event function. From there on the column is of a motion that is late by dt. The motion is made
+up for with the rates at the next event, -f dt, not with those after this one: a step does not follow at once
+the fast modes that the forces of a touch set going, and the rates after it are none of its own.
 """
 
 from __future__ import annotations
@@ -57,6 +59,7 @@ class Trail(Struct):
     """Tangent and events of a motion, filled in as it goes on; k events fit."""
 
     columns: Floats  # (nx, c), changes of the coordinates
+    delay: Floats  # (c,), s, by which the motion of a column is late
     event: Ints  # (k, 4), pair, kind (NORMAL or FRICTION), its state before and after
     tick: Ints  # (k,)
     approach: (
@@ -70,7 +73,7 @@ class Trail(Struct):
     column: Floats  # (nx,), work space
     after: Floats  # (nx,)
     load: Floats  # (s R,)
-    rates: Floats  # (2, nx), of the coordinates before and after an event
+    rates: Floats  # (nx,), of the coordinates before an event
     kick: (
         Floats  # (2 R, nx), change of the coordinates by impulses that change with a local motion or velocity
     )
@@ -202,8 +205,6 @@ def rates_of(bodies: Bodies, s: int, x: Floats, state: Ints, solution: Solution,
 def carry_event(
     bodies: Bodies,
     s: int,
-    x: Floats,
-    state: Ints,
     pair: int,
     kind: int,
     least: float,
@@ -211,19 +212,14 @@ def carry_event(
     solution: Solution,
     trail: Trail,
 ) -> bool:
-    """Carry the columns across an event of a pair, from `trail.before` and its states to x and the present.
-
-    False where no forces obey the laws.
-    """
-    n_local, n_row, n_x = bodies.n_local, bodies.load.shape[0], x.size
-    if not rates_of(bodies, s, x, state, solution, trail.rates[1]):
-        return False
-    if not rates_of(bodies, s, trail.before, trail.state, solution, trail.rates[0]):
+    """Carry the columns across an event of a pair at `trail.before`; False where no forces obey the laws."""
+    n_local, n_row, n_x = bodies.n_local, bodies.load.shape[0], trail.column.size
+    if not make_up(bodies, s, trail.before, trail.state, solution, trail):
         return False
     start, first, row, begun = solution.start, pair * n_local, pair * s, solution.begun
     for r in range(n_row):  # velocities and accelerations of the local motions, before the event
         begun[r], total = start[n_row + r], start[2 * n_row + r]
-        for i in range(state.size):
+        for i in range(trail.state.size):
             if trail.state[i] != OPEN:
                 n, t = solution.instant[i, NORMAL], solution.instant[i, FRICTION]
                 for a in range(n_local):
@@ -257,7 +253,7 @@ def carry_event(
             if weight != 0.0:
                 for k in range(n_x):
                     delay -= weight * bodies.local[r, k] * trail.column[k] / passing
-        shift_columns(delay, c, trail)
+        shift_column(delay, c, trail)
         if has_impulses:
             for r in range(2 * n_row):
                 total = begun[r] * delay
@@ -269,25 +265,33 @@ def carry_event(
 
 
 @linked_sum
-def shift_columns(delay: float, c: int, trail: Trail) -> None:
-    """Add to a column what an event changes that comes later by `delay` (s, for a unit column)."""
+def shift_column(delay: float, c: int, trail: Trail) -> None:
+    """Let the motion of a column without delay go on by `delay` (s, for a unit column)."""
+    trail.delay[c] = delay
     for k in range(trail.column.size):
-        trail.columns[k, c] += (trail.rates[0, k] - trail.rates[1, k]) * delay
+        trail.columns[k, c] += trail.rates[k] * delay
 
 
 @linked_sum
-def carry_breakaway(
-    bodies: Bodies, s: int, x: Floats, state: Ints, pair: int, solution: Solution, trail: Trail
-) -> bool:
+def make_up(bodies: Bodies, s: int, x: Floats, state: Ints, solution: Solution, trail: Trail) -> bool:
+    """Make up for the delays of the columns at the coordinates x; False where no forces obey the laws."""
+    if not rates_of(bodies, s, x, state, solution, trail.rates):
+        return False
+    for c in range(trail.delay.size):
+        shift_column(-trail.delay[c], c, trail)
+        trail.delay[c] = 0.0
+    return True
+
+
+@linked_sum
+def carry_breakaway(bodies: Bodies, s: int, pair: int, solution: Solution, trail: Trail) -> bool:
     """Carry the columns across the breakaway of a sticking pair, whose friction falls to that of sliding."""
-    if not rates_of(bodies, s, x, state, solution, trail.rates[1]):
+    if not make_up(bodies, s, trail.before, trail.state, solution, trail):
         return False
-    if not rates_of(bodies, s, trail.before, trail.state, solution, trail.rates[0]):
-        return False
-    n_x, size, pace = x.size, 0.0, 0.0
+    n_x, size, pace = trail.column.size, 0.0, 0.0
     for k in range(n_x):
-        trail.column[k] = trail.rates[0, k]
-        size, pace = max(size, abs(trail.before[k])), max(pace, abs(trail.rates[0, k]))
+        trail.column[k] = trail.rates[k]
+        size, pace = max(size, abs(trail.before[k])), max(pace, abs(trail.rates[k]))
     passing = margin_change(bodies, s, pair, DIFFERENCE * size / pace, solution, trail)
     for c in range(trail.columns.shape[1]):
         largest = 0.0
@@ -296,7 +300,7 @@ def carry_breakaway(
             largest = max(largest, abs(trail.column[k]))
         if largest > 0.0 and passing != 0.0:
             change = margin_change(bodies, s, pair, DIFFERENCE * size / largest, solution, trail)
-            shift_columns(-change / passing, c, trail)
+            shift_column(-change / passing, c, trail)
     return True
 
 

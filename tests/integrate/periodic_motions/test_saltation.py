@@ -1,6 +1,7 @@
 """Derivatives of a revolution by its beginning: finite differences, determinants, exact zeros."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from rubhpc import LumpedStator
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
 from rubhpc.integrate.case import run_case
+from rubhpc.integrate.periodic_motions.collocated_motion import CollocatedMotion
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.periodic_motions.saltation import monodromy
 from rubhpc.integrate.setup import prepare
@@ -27,7 +29,7 @@ HEAVY = with_keys(trial_rig(2), {"rotor.gravity": "9.81 m/s^2"})
 SLIDING = Contact()
 
 
-def motion_of(rig, ratio, clearance_ratio, friction, contact=SLIDING, transient=20):
+def motion_of(rig, ratio, clearance_ratio, friction, contact=SLIDING, transient=20, follow=PiecewiseMotion):
     model = assemble(rig)
     spin = ratio * first_lateral_frequency(model)
     clearance = clearance_ratio * contact_free_amplitude(model, spin)
@@ -40,7 +42,7 @@ def motion_of(rig, ratio, clearance_ratio, friction, contact=SLIDING, transient=
         friction=friction,
         recording=Recording(transient=transient, revolutions=1, samples_per_revolution=64, keep=()),
     )
-    return PiecewiseMotion(setup, clearance, friction, record.final)
+    return follow(setup, clearance, friction, record.final)
 
 
 def differences(motion, motions, states, step=1e-7):
@@ -77,6 +79,31 @@ def test_derivative_is_that_of_finite_differences(name):
     error = (found - differences(motion, motion.start, motion.states)) * scale[:, None] / scale
     size = found * scale[:, None] / scale
     assert np.abs(error).max() < 1e-6 * np.abs(size).max()
+
+
+SPRING = Contact(law="penalty", stiffness=5e6, damping=400.0)
+BY_STEPS = {
+    "damped penalty": SPRING,
+    "penalty": replace(SPRING, damping=0.0),
+    "Coulomb": Contact(friction_law="coulomb"),
+    "Coulomb, restitution": Contact(friction_law="coulomb", restitution=0.5),
+}
+
+
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-6])
+@pytest.mark.parametrize("name", BY_STEPS)
+def test_derivative_by_steps_is_that_of_finite_differences(name, accuracy):
+    """Of the change that decays most slowly: no step follows what a damper sets going at a touch."""
+    stiff = with_keys(PAPER, {"stator.youngs_modulus": "30 GPa"})
+    motion = motion_of(stiff, 1.1, 0.7, 0.1, BY_STEPS[name], 60, partial(CollocatedMotion, accuracy=accuracy))
+    revolution = motion.revolve(motion.start, motion.states)
+    assert len(revolution.pieces) > 2
+    value, shape = np.linalg.eig(motion.monodromy([revolution]))
+    slowest = np.argmax(abs(value))
+    change = shape[:, slowest].real * 1e-4 * motion.size(motion.start) / motion.size(shape[:, slowest].real)
+    ahead, behind = (motion.revolve(motion.start + sign * change, motion.states).end for sign in (1, -1))
+    found = motion.monodromy([revolution]) @ change
+    assert motion.size(found - (ahead - behind) / 2) < 2e-3 * motion.size(found)
 
 
 @pytest.mark.parametrize("name", ["one stator", "three stators", "ring, always in contact"])
