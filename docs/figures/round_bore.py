@@ -332,7 +332,7 @@ def rolling(ax: Axes, table: Table) -> None:
 
 
 def falling(clearance: float, restitution: float, until: float, samples: int) -> rubhpc.Record:
-    """Return the record of a disc that nothing holds, from the centre of a rigid bore on; 100 turns a second."""
+    """Return the record of a disc that falls from the centre of a rigid bore; 100 turns a second."""
     rig = rubhpc.Rig.from_matrices(
         MASS * np.eye(2),
         np.zeros((2, 2)),
