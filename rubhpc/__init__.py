@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from rubhpc.fem.assemble import assemble
     from rubhpc.fem.dry_whirl import dry_whirl
     from rubhpc.fem.linear_design import linear_design
+    from rubhpc.identification.identify import Identification, identify
     from rubhpc.integrate.branches.branch import Branch
     from rubhpc.integrate.periodic_motion import PeriodicMotion
     from rubhpc.integrate.record import Record, State
@@ -44,6 +45,7 @@ __all__ = [
     "Bore",
     "Branch",
     "Carrier",
+    "Identification",
     "InputError",
     "Load",
     "LumpedStator",
@@ -67,6 +69,7 @@ __all__ = [
     "branch",
     "certify_whirl",
     "dry_whirl",
+    "identify",
     "least_knock",
     "linear_design",
     "measured",
@@ -85,6 +88,7 @@ _HOMES = {
     "Bore": "rubhpc.rig.stators:Bore",
     "Branch": "rubhpc.integrate.branches.branch:Branch",
     "Carrier": "rubhpc.rig.carriers:Carrier",
+    "Identification": "rubhpc.identification.identify:Identification",
     "InputError": "rubhpc.errors:InputError",
     "Load": "rubhpc.rig.rotors:Load",
     "LumpedStator": "rubhpc.rig.stators:LumpedStator",
@@ -108,6 +112,7 @@ _HOMES = {
     "branch": "rubhpc.branch:branch",
     "certify_whirl": "rubhpc.whirl_simulations:certify_whirl",
     "dry_whirl": "rubhpc.fem.dry_whirl:dry_whirl",
+    "identify": "rubhpc.identification.identify:identify",
     "least_knock": "rubhpc.knocks:least_knock",
     "linear_design": "rubhpc.fem.linear_design:linear_design",
     "measured": "postproc.measured.measured:measured",

@@ -48,6 +48,14 @@ COMMANDS = {
     "view": ("rubhpc.commands.report:view", "The same for a large store, served to this machine only."),
     "export": ("rubhpc.commands.export:export", "Cases as one file: HDF5, CSV or Parquet."),
     "dataset": ("rubhpc.commands.dataset:dataset", "Labelled windows through sensors, for machine learning."),
+    "identify": (
+        "rubhpc.commands.identify:identify",
+        "The rub behind a measured vibration, as a posterior.",
+    ),
+    "calibrate": (
+        "rubhpc.commands.calibrate:calibrate",
+        "Whether identification is right as often as it says.",
+    ),
     "claims": ("rubhpc.commands.claims:claims", "The paper's claims against the stores of jobs/paper."),
 }
 

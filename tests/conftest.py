@@ -51,6 +51,7 @@ SLOW = (
     "figures/test_maps.py::test_command_draws",
     "figures/test_maps.py::test_names_of_facets_stay_within_their_panels",
     "figures/test_run_up_figures.py::test_a_waterfall_stacks_them_at_their_speeds",
+    "identification/test_identify.py",
     "input/test_reading.py::test_pint_stays_away_until_it_is_needed",
     "integrate/branches/test_branch.py",
     "integrate/branches/test_touch_that_vanishes.py",

@@ -64,7 +64,8 @@ def measured(
         `revolution`, and amplitude and phase of orders 1/3, 1/2, 1 and 2 over `revolution` and `order`. Of
         several files of data, signals and `spin_speed` over `speed`. Signals are `vertical`, `horizontal` and
         others of a store where they have these names, else `probe_NAME`. What is wrong with the record, such
-        as missing or clipped samples, is in the attribute `note`, one problem a line.
+        as missing or clipped samples, is in the attribute `note`, one problem a line; `rate` (Hz) is that of
+        the samples in the file, and `has_absolute_phase` is 1 where phases count from straight up.
 
     Raises
     ------
@@ -132,6 +133,7 @@ def _one(keys: MeasuredKeys, path: Path) -> xr.Dataset:
     probes = [dict(signal.probe) for signal in keys.signals if signal.probe]
     found = xr.Dataset(variables, coords=coords, attrs={"study": {"record": {"probe": probes}}})
     found.attrs |= {MEASURED: str(path), "note": "\n".join(record.notes)}
+    found.attrs |= {"rate": record.rate, "has_absolute_phase": int(record.is_absolute)}
     if keys.rig is not None:
         found.attrs["rig"] = read_rig(_rig_path(keys)).as_dict()
     found = _with_orbit(found, keys, probes)

@@ -38,6 +38,8 @@ class Record(NamedTuple):
     speed: Floats  # (n_revolution,), rad/s
     begins: Floats  # (n_revolution + 1,), s, the end of the last one too
     notes: list[str]  # what is wrong
+    rate: float  # Hz, of the samples in the file
+    is_absolute: bool  # whether the angle of the shaft is that from straight up
 
     @property
     def is_steady(self) -> bool:
@@ -104,7 +106,14 @@ def _tracked(keys: MeasuredKeys, path: Path) -> Record:
     if high - low < _FEWEST:
         raise InputError(f"{path}: drop-outs leave no {_FEWEST} revolutions in a row; give another record")
     n, begins = keys.samples_per_revolution, begins[low : high + 1]
-    found = Record({}, 2.0 * math.pi / np.diff(begins), begins, [f"{path.name}: {note}" for note in notes])
+    found = Record(
+        signals={},
+        speed=2.0 * math.pi / np.diff(begins),
+        begins=begins,
+        notes=[f"{path.name}: {note}" for note in notes],
+        rate=1.0 / record.step,
+        is_absolute=turning.is_absolute,
+    )
     for signal in keys.signals:
         column = record.values[signal.column]
         values = by_angle(column, record.step, turning, first + low, first + high, n)

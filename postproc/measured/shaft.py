@@ -33,6 +33,7 @@ class Turning(NamedTuple):
     first: float  # revolutions at the beginning and at the end
     last: float
     notes: list[str]
+    is_absolute: bool = False  # whether the angle is that from straight up, as in a simulation
 
 
 def at_constant_speed(speed: float, duration: float) -> Turning:
@@ -88,7 +89,13 @@ def by_key_phasor(values: Floats, step: float, keys: SpeedKeys, where: str) -> T
         notes.append("the angle of the shaft counts from one of several pulses: phases are relative")
     # A logic pulse is placed by its sample alone, within a step: variance step^2 / 12.
     spline = UnivariateSpline(turns, pulses, k=3, s=pulses.size * step**2 / 12.0)
-    return Turning(lambda wanted: np.asarray(spline(wanted)), float(turns[0]), float(turns[-1]), notes)
+    return Turning(
+        time_at=lambda wanted: np.asarray(spline(wanted)),
+        first=float(turns[0]),
+        last=float(turns[-1]),
+        notes=notes,
+        is_absolute=keys.per_revolution == 1 and keys.zero == "straight_up",
+    )
 
 
 def _crossings(values: Floats, level: float, band: float) -> Floats:

@@ -62,6 +62,41 @@ def steady_response(model: Model, spin: float) -> NDArray[np.complex128]:
     return response
 
 
+def harmonic_response(
+    model: Model, spin: float, order: float, force: NDArray[np.complex128]
+) -> NDArray[np.complex128]:
+    """Return the steady response of the rotor to a force at a multiple of the spin, without contact.
+
+    Parameters
+    ----------
+    model : Model
+    spin : float
+        rad/s.
+    order : float
+        The force is `Re(force exp(i order spin t))`.
+    force : (n_dof,) complex
+        N and N m.
+
+    Returns
+    -------
+    (n_dof,) complex
+        c of `u(t) = Re(c exp(i order spin t))`, m and rad.
+
+    Raises
+    ------
+    InputError
+        If that is a natural frequency of an undamped rotor.
+    """
+    rotor, rate = model.rotor.at(spin), order * spin
+    dynamic = rotor.stiffness - rate**2 * rotor.mass + 1j * rate * (rotor.damping + spin * rotor.gyroscopic)
+    try:
+        return np.asarray(np.linalg.solve(dynamic, force))
+    except np.linalg.LinAlgError:
+        raise InputError(
+            f"order {order:g} of speed {spin:.6g} rad/s: the undamped rotor resonates; give it damping"
+        ) from None
+
+
 def contact_free_amplitude(model: Model, spin: float, node: int | None = None) -> float:
     """Return the largest deflection `sqrt(v^2 + w^2)` of the steady contact-free orbit, m.
 

@@ -101,13 +101,13 @@ def sag_at(body: Body, sag: Floats, node: int) -> tuple[float, float]:
     return float(sag[v]) if v >= 0 else 0.0, float(sag[w]) if w >= 0 else 0.0
 
 
-SOFTNESS = 2.5  # 1/s2: a hundred-thousandth of the weight in a clearance of 0.4 mm
+SOFTNESS = 100.0  # 1/s2: a thousandth of the weight in a clearance of 0.1 mm
 
 
 def caught(body: Body, nodes: set[int]) -> Body:
     """Return a rotor that only bores at some nodes hold: with a softness, so that it has a static position.
 
-    Modes of 0.08 Hz stand for lateral rigid-body modes. A rotor that is held, or whose bearings depend on the
+    Modes of 1.6 Hz stand for lateral rigid-body modes. A rotor that is held, or whose bearings depend on the
     speed, is unchanged.
     """
     at = [body.index(node, name) for node in nodes for name in ("v", "w")]

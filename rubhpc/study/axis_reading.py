@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from rubhpc.rig.rig import Rig
 
 _TABLE_KEYS = ("values", *RANGE_KEYS, "sweep")
+NORMAL_KEYS = ("mean", "std")  # of a normal prior, which an identification reads
 
 
 def make_axis(name: str, values: object, rig: Rig, file: str = "") -> Axis:
@@ -61,7 +62,7 @@ def make_axis(name: str, values: object, rig: Rig, file: str = "") -> Axis:
         When the name is unknown, or a value is invalid or duplicated.
     """
     where = place(file, "grid", name)
-    declared = _declared(name, rig, where)
+    declared = declared_axis(name, rig, where)
     sweep, is_range = FROM_REST, False
     if isinstance(values, dict):
         values, sweep = _read_table(values, where)
@@ -81,7 +82,7 @@ def unit_of(name: str, rig: Rig) -> str:
     InputError
         When the name is unknown, or its values are no quantities.
     """
-    declared = _declared(name, rig, name)
+    declared = declared_axis(name, rig, name)
     if declared.metadata["kind"] != "quantity":
         raise InputError(f"{name}: is not a quantity; give one, such as friction")
     return str(declared.metadata["unit"])
@@ -100,7 +101,7 @@ def make_range(name: str, table: Mapping[str, object], rig: Rig, file: str = "")
     where = place(file, "grid", name)
     if "sweep" in table:
         raise InputError(f"{where}: sweep: {NO_NEIGHBOURS}")
-    declared = _declared(name, rig, where)
+    declared = declared_axis(name, rig, where)
     if declared.metadata["kind"] != "quantity":
         raise InputError(f"{where}: none but a quantity is drawn from a range; write a list of values")
     ends = read_ends(table, declared.metadata["unit"], where)
@@ -135,13 +136,14 @@ def flatten(table: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]
     """Return dotted keys and values of a table in which `stator.angle = 0` may be written without quotes."""
     pairs: list[tuple[str, Any]] = []
     for key, value in table.items():
-        is_table = isinstance(value, dict) and value and not set(value) & set(_TABLE_KEYS)
+        is_table = isinstance(value, dict) and value and not set(value) & {*_TABLE_KEYS, *NORMAL_KEYS}
         is_table = is_table and prefix + key not in OWN and prefix.count(".") < 8
         pairs += flatten(value, f"{prefix}{key}.") if is_table else [(prefix + key, value)]
     return pairs
 
 
-def _declared(name: str, rig: Rig, where: str) -> Field[Any]:
+def declared_axis(name: str, rig: Rig, where: str) -> Field[Any]:
+    """Return the declaration of what an axis sets; InputError where it sets nothing."""
     if name in OWN:
         return OWN[name]
     if name.startswith((RUN_UP_PREFIX, DRIVE_PREFIX)):

@@ -404,9 +404,18 @@ def read_study(
     InputError
         When the file or its rig is invalid; one line with file, table, key and how to fix it.
     """
-    source = Path(path)
+    return study_of(read_toml(Path(path)), Path(path), output, trust_rig=trust_rig)
+
+
+def study_of(
+    table: dict[str, Any],
+    source: Path,
+    output: str | PathLike[str] | None = None,
+    *,
+    trust_rig: bool = False,
+) -> Study:
+    """Return the study of the tables of a file; see `read_study`."""
     file = str(source)
-    table = read_toml(source)
     if "rotor" in table:
         raise InputError(
             f"{place(file)}: is a rig, not a study; name it in a study, rig = {quoted([source.name])}, "

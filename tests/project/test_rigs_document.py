@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rubhpc import read_rig
+from rubhpc import Bore, read_rig
 from rubhpc.rig.reading import rig_from_dict
 
 DOCUMENT = (Path(__file__).parents[2] / "docs" / "guide" / "rigs.md").read_text()
@@ -41,7 +41,7 @@ def test_oscillator_at_a_wall_prints_what_is_said(capsys):
 def test_tables_of_stators_are_read():
     tables = (tomllib.loads(text) for text in re.findall(r"```toml\n(\[\[.*?)```", DOCUMENT, re.DOTALL))
     found = [table for table in tables if "stator" in table or "carrier" in table]
-    ring, bent, carried, lumped = (table["stator"] for table in found)
+    ring, bent, carried, lumped, bores = (table["stator"] for table in found)
     packaged = read_rig("mokhtar2017").with_geometry("linear").as_dict()
     moved = packaged | {"stator": [packaged["stator"][0] | carried[0]], "carrier": found[2]["carrier"]}
     bending = rig_from_dict(packaged | {"stator": [packaged["stator"][0] | bent[0]]})
@@ -50,3 +50,6 @@ def test_tables_of_stators_are_read():
     rig = rig_from_dict(packaged | {"stator": [packaged["stator"][0] | ring[0], *lumped]})
     assert len(rig.stator) == 14
     assert rig.stator[-1].rigid
+    (seal,) = rig_from_dict(packaged | {"stator": bores}).stator
+    assert isinstance(seal, Bore)
+    assert seal.law.kind == "penalty"

@@ -1,0 +1,1 @@
+"""Identification: which rub, if any, is behind a measured vibration, as a posterior distribution."""

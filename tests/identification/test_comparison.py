@@ -1,0 +1,125 @@
+"""Likelihoods of motions: against integrals done another way, and what counts as a motion that repeats."""
+
+import numpy as np
+import pytest
+from scipy.special import logsumexp
+
+from rubhpc.identification.channels import Channels
+from rubhpc.identification.comparison import DISCREPANCIES, Unknown, log_likelihood, period_of_lines
+from rubhpc.identification.lines import LineComparison
+from rubhpc.identification.powers import PowerComparison
+
+N, TURNS, NOISE = 32, 48, 0.3
+ANGLE = 2 * np.pi * np.arange(N * TURNS) / N
+
+
+def channels(waves, is_absolute=False):
+    names = ("vertical", "horizontal")
+    return Channels(
+        names=names,
+        simulated=names,
+        units=("m", "m"),
+        long_names=names,
+        probes=(),
+        waves=np.asarray(waves),
+        n=N,
+        spin=100.0,
+        highest_order=0.4 * N,
+        is_absolute=is_absolute,
+    )
+
+
+def motion(turned=0.0, half=0.4):
+    angle = ANGLE + turned
+    return np.stack(
+        [
+            np.cos(angle) + half * np.cos(angle / 2 + 0.2) + 0.2 * np.cos(3 * angle),
+            np.sin(angle) - half * np.sin(angle / 2) + 0.3 * np.sin(2 * angle),
+        ]
+    )
+
+
+def noisy(turned=0.0, seed=1):
+    return motion(turned) + NOISE * np.random.default_rng(seed).standard_normal((2, ANGLE.size))
+
+
+def brute_force(comparison, seen, angles):
+    """The same by the residuals themselves, at every angle."""
+    size = DISCREPANCIES[:, None, None, None]
+    floor = (1e-3 * noisy().std(axis=1)[:, None]) ** 2
+    variance = comparison.measured.variance + seen.variance + floor + (size * np.abs(seen.values)) ** 2
+    model = seen.values * np.exp(1j * comparison.orders * angles[:, None, None])
+    apart = np.abs(comparison.measured.values - model) ** 2 / variance + np.log(np.pi * variance)
+    terms = -apart.sum(axis=(2, 3))
+    return logsumexp(terms) - np.log(terms.size)
+
+
+@pytest.mark.parametrize("is_absolute", [True, False])
+def test_the_likelihood_is_the_integral_over_angles_and_discrepancies(is_absolute):
+    lines = LineComparison(channels(noisy(), is_absolute), 2, [])
+    n_angle = 2 if is_absolute else 8000
+    angles = 4 * np.pi * np.arange(n_angle) / n_angle
+    seen = lines.of(motion(half=0.38))
+    assert log_likelihood(lines, seen) == pytest.approx(brute_force(lines, seen, angles), abs=0.02)
+
+
+def test_unknown_angles_do_not_matter_known_ones_by_whole_revolutions_alone():
+    free, fixed = (LineComparison(channels(noisy(), known), 2, []) for known in (False, True))
+    at = {turned: motion(turned) for turned in (0.0, 1.1, 2 * np.pi)}
+    assert log_likelihood(free, free.of(at[1.1])) == pytest.approx(
+        log_likelihood(free, free.of(at[0.0])), abs=1e-3
+    )
+    one, other, whole = (log_likelihood(fixed, fixed.of(waves)) for waves in at.values())
+    assert whole == pytest.approx(one, abs=1e-6)
+    assert other < one - 10.0
+
+
+def test_noise_is_that_between_the_lines():
+    lines = LineComparison(channels(noisy()), 2, [])
+    # Of white noise: 4 sigma^2 / n.
+    assert lines.measured.variance == pytest.approx(4 * NOISE**2 / ANGLE.size, rel=0.6)
+    assert lines.measured.variance.mean() == pytest.approx(4 * NOISE**2 / ANGLE.size, rel=0.1)
+    assert lines.misfit(lines.of(motion())) == pytest.approx(1.0, abs=0.5)
+
+
+def test_unknown_forces_are_integrated_over():
+    """By Monte Carlo over forces, their phases and sizes."""
+    waves = noisy()
+    lines = LineComparison(channels(waves, is_absolute=True), 1, [])
+    shapes = np.array([[1.0 + 0.5j], [0.3 - 1j]])
+    unknown = Unknown(2.0, shapes, np.array([0.1, 0.4]))
+    without = np.stack(
+        [row - 2 * np.real(np.mean(row * np.exp(-2j * ANGLE)) * np.exp(2j * ANGLE)) for row in motion()]
+    )
+    seen = lines.of(without)
+    rng = np.random.default_rng(2)
+    sizes = rng.choice(unknown.sizes, 40000)
+    forces = sizes * (rng.standard_normal(40000) + 1j * rng.standard_normal(40000)) / np.sqrt(2)
+    at = int(np.flatnonzero(lines.orders == 2.0)[0])
+    variance = lines.measured.variance[:, at] + (1e-3 * waves.std(axis=1)) ** 2
+    apart = lines.measured.values[:, at, None] - shapes * forces
+    alone = -(np.abs(apart) ** 2 / variance[:, None] + np.log(np.pi * variance)[:, None]).sum(axis=0)
+    zero = -(np.abs(lines.measured.values[:, at]) ** 2 / variance + np.log(np.pi * variance)).sum()
+    gain = logsumexp(alone) - np.log(alone.size) - zero
+    found = lines.by_discrepancy(seen, unknown)[0] - lines.by_discrepancy(seen)[0]
+    assert found == pytest.approx(gain, abs=0.2)
+
+
+def test_noise_alone_does_not_make_a_motion_chaotic_and_chaos_does():
+    assert period_of_lines(channels(noisy())) == 6  # holds whole periods of 2
+    still = np.stack([motion()[0], np.random.default_rng(3).standard_normal(ANGLE.size)])
+    assert period_of_lines(channels(still)) == 6
+    walk = np.cumsum(np.random.default_rng(4).standard_normal((2, ANGLE.size)), axis=1)
+    assert period_of_lines(channels(motion() + 0.05 * walk)) == 0
+
+
+def test_powers_of_a_chaotic_motion_need_no_phase():
+    rng = np.random.default_rng(5)
+    drift = np.cumsum(0.3 * rng.standard_normal((2, ANGLE.size)), axis=1)
+    measured = np.stack([np.cos(ANGLE + drift[0]), np.sin(ANGLE + drift[1])])
+    again = np.cumsum(0.3 * np.random.default_rng(6).standard_normal((2, ANGLE.size)), axis=1)
+    same, other = ((np.stack([np.cos(ANGLE + d[0]), np.sin(ANGLE + d[1])])) for d in (again, 0.3 * again))
+    powers = PowerComparison(channels(measured), [])
+    assert "no phases" in powers.about
+    assert log_likelihood(powers, powers.of(same)) > log_likelihood(powers, powers.of(other)) + 5
+    assert powers.misfit(powers.of(same)) < 3

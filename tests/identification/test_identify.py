@@ -1,0 +1,175 @@
+"""What is behind a record: a rub, by another scheme than the one that fits, misalignment, or nothing."""
+
+import re
+import sys
+
+import numpy as np
+import pytest
+import rubbing_machine
+import xarray as xr
+from click.testing import CliRunner
+
+import rubhpc
+from rubhpc.commands.identify import identify
+from rubhpc.errors import InputError
+from rubhpc.identification import evaluation
+from rubhpc.identification.problem import read_problem
+
+SMALL = {"live": 16, "draws": 200}
+
+
+@pytest.fixture(scope="module")
+def rub(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("rub")
+    return rubbing_machine.write(folder, rubbing_machine.rubbing(40, 0.05))
+
+
+@pytest.fixture(scope="module")
+def found(rub, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("found")
+    return folder, rubhpc.identify(*rub, output=folder, **SMALL)
+
+
+def test_a_rub_is_found_with_its_clearance_and_friction(found):
+    _, one = found
+    text = "\n".join(one.lines)
+    assert "it is a rub: odds of more than a million to 1" in text
+    assert "stator 1 at node 8: touches with a probability of 1" in text
+    draws = one.tree["posterior"]
+    assert float(draws["clearance"].mean()) == pytest.approx(139.2161e-6, rel=0.02)
+    assert float(draws["friction"].mean()) == pytest.approx(rubbing_machine.FRICTION, rel=0.05)
+    assert draws["clearance"].attrs["units"] == "m"
+    assert float(draws["contact_fraction"].mean()) == pytest.approx(0.198, abs=0.01)
+
+
+def test_the_posterior_is_inference_data_with_what_it_predicts(found):
+    import arviz
+
+    folder, one = found
+    stored = arviz.from_netcdf(folder / "posterior.nc")
+    groups = {"posterior", "prior", "sample_stats", "posterior_predictive", "observed_data"}
+    assert groups <= set(stored.groups())
+    assert float(arviz.summary(stored.posterior[["friction"]])["mean"].iloc[0]) == pytest.approx(
+        0.3, abs=0.02
+    )
+    seen, predicted = (
+        one.tree[group]["spectrum_torsion"] for group in ("observed_data", "posterior_predictive")
+    )
+    first = int(np.flatnonzero(np.isclose(seen["order"], 1.0))[0])
+    assert predicted.values[..., first] == pytest.approx(float(seen[first]), rel=0.05)
+
+
+def test_an_interrupted_identification_goes_on_and_ends_alike(rub, found, tmp_path, monkeypatch):
+    _, whole = found
+    computed = evaluation.Evaluator.outcome
+    calls = []
+
+    def killed(self, values):
+        if self.evaluated.of(values) is None:
+            calls.append(1)
+        if len(calls) == 150:
+            raise KeyboardInterrupt
+        return computed(self, values)
+
+    monkeypatch.setattr(evaluation.Evaluator, "outcome", killed)
+    with pytest.raises(KeyboardInterrupt):
+        rubhpc.identify(*rub, output=tmp_path, **SMALL)
+    assert len(calls) == 150
+    calls[:] = [1] * 1000
+    again = rubhpc.identify(*rub, output=tmp_path, **SMALL)
+    assert again.tree["posterior"].equals(whole.tree["posterior"])
+    assert again.lines == whole.lines
+    n_case = sum(path.stat().st_size for path in (tmp_path / "cases").iterdir())
+    assert n_case == sum(path.stat().st_size for path in (found[0] / "cases").iterdir())  # none twice
+
+
+@pytest.mark.parametrize("kind", ["healthy", "misaligned"])
+def test_what_is_not_a_rub_is_said(tmp_path, kind):
+    columns = rubbing_machine.linear(kind == "misaligned", 40, 0.05)
+    files = rubbing_machine.write(tmp_path, columns)
+    one = rubhpc.identify(*files, **SMALL)
+    evidence = one.tree["evidence"]["log_evidence"].to_series()
+    text = "\n".join(one.lines)
+    if kind == "misaligned":
+        assert "it is not a rub: odds of more than a million to 1 against one" in text
+        assert "it is misalignment: odds of more than a million to 1 against no rub" in text
+        assert evidence["misalignment"] > max(evidence["rub"], evidence["no rub"]) + 10
+    else:
+        assert "it is not a rub: odds of more than a million to 1 against one" in text
+        assert "it is probably no rub: odds of" in text  # against misalignment, whose force may be small
+        assert max(evidence["no rub"], evidence["misalignment"]) > evidence["rub"] + 10
+
+
+def test_a_clearance_that_may_be_wide_does_not_hide_a_healthy_machine(tmp_path):
+    columns = rubbing_machine.linear(False, 40, 0.05)
+    study = rubbing_machine.STUDY.replace('stop = "150 um"', 'stop = "400 um"')
+    files = rubbing_machine.write(tmp_path, columns, study)
+    text = "\n".join(rubhpc.identify(*files, **SMALL).lines)
+    assert "it is not a rub: odds of more than a million to 1 against one" in text
+    files[1].write_text(study.replace('"120 um"', '"300 um"'))
+    text = "\n".join(rubhpc.identify(*files, **SMALL).lines)
+    assert "no case of [grid] touches, so that a rub has not been tried" in text
+    assert "it is probably no rub" in text
+
+
+def test_slack_bearings_take_the_place_of_springs(tmp_path):
+    files = rubbing_machine.write(tmp_path, rubbing_machine.linear(False, 40, 0.05))
+    problem = read_problem(*files, slack=True)
+    assert [other.name for other in problem.others[2:]] == [f"slack bearing at node {n}" for n in (1, 15)]
+    rig = problem.others[2].machine.study.rig
+    assert [bearing.stiffness_matrix[0][0] for bearing in rig.rotor.bearing] == pytest.approx([1e3, 1e6])
+    (wall,) = rig.stator
+    assert (wall.node, wall.law.stiffness) == (1, pytest.approx(1e6))
+    assert [prior.name for prior in problem.others[2].priors] == ["clearance"]  # none of the rotor is open
+
+
+def test_a_speed_that_is_known_roughly_is_refined(tmp_path):
+    columns = rubbing_machine.linear(True, 40, 0.05)
+    del columns["key_phasor"]
+    measured, study = rubbing_machine.write(tmp_path, columns)
+    measured.write_text(measured.read_text().replace(f"{rubbing_machine.SPIN} rad/s", "299 rad/s"))
+    problem = read_problem(measured, study)
+    assert problem.channels.spin == pytest.approx(rubbing_machine.SPIN, rel=2e-5)  # a thousandth of a bin
+    assert "repeats" in problem.comparison.about
+    assert not problem.channels.is_absolute
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "text"),
+    [
+        (r"\[grid\]", "[sample]\nn = 3\n[grid]", "remove .sample."),
+        (r"\{.*\}", "1e-4", "nothing is open"),
+        ("clearance =", "clearence =", "clearence"),
+    ],
+)
+def test_what_cannot_be_identified_is_refused_in_a_line(tmp_path, old, new, text):
+    measured, study = rubbing_machine.write(tmp_path, rubbing_machine.linear(False, 40, 0.05))
+    study.write_text(re.sub(old, new, study.read_text()))
+    with pytest.raises(InputError, match=text) as caught:
+        read_problem(measured, study)
+    assert "\n" not in str(caught.value)
+
+
+def test_without_the_sampler_a_line_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "dynesty", None)
+    files = rubbing_machine.write(tmp_path, rubbing_machine.linear(False, 40, 0.05))
+    with pytest.raises(InputError, match=r"pip install 'rubhpc\[identify\]'"):
+        rubhpc.identify(*files)
+
+
+def test_the_command_writes_posterior_and_figures(rub, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    arguments = [*map(str, rub), "--live", "12", "--draws", "50", "--workers", "2"]
+    done = CliRunner().invoke(identify, arguments)
+    assert done.exit_code == 0, done.output
+    assert "it is a rub" in done.output
+    folder = tmp_path / "probe_identified"
+    assert {path.name for path in folder.iterdir()} == {
+        "cases",
+        "posterior.nc",
+        "corner.png",
+        "predicted.png",
+    }
+    alone = rubhpc.identify(*rub, live=12, draws=50)
+    with xr.open_datatree(folder / "posterior.nc", engine="h5netcdf") as stored:
+        assert stored["posterior"].equals(alone.tree["posterior"])  # any number of processes
