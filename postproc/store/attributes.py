@@ -17,6 +17,7 @@ from rubhpc.input.fields import key_of, parse_field
 from rubhpc.rig.probes import Probe
 from rubhpc.study.contact_keys import ContactKeys
 from rubhpc.study.drive_keys import DriveKeys
+from rubhpc.study.initial import Initial
 from rubhpc.study.run_up_keys import RunUpKeys
 from rubhpc.study.tables import Integrator, Recording
 
@@ -39,7 +40,7 @@ _TABLES: dict[str, type | None] = {
     "drive": DriveKeys,
     "branch": None,
     "sample": None,
-    "initial": None,
+    "initial": Initial,
 }
 _NUMBERS, _LARGEST = (int, float), 2.0**63
 

@@ -8,6 +8,7 @@ import xarray as xr
 from closed_form import simulate
 from trial_rig import trial_rig
 
+import rubhpc
 from rubhpc import assemble
 from rubhpc.errors import InputError
 from rubhpc.running.driver import run
@@ -46,7 +47,7 @@ def test_a_case_goes_on_where_another_has_ended(first, tmp_path):
     study = study_of(tmp_path, "second", text)
     run(study, quiet=True)
     whole = simulate("mokhtar2017", speed_ratio=0.8, revolutions=4, **CASE)
-    with xr.open_zarr(study.output) as store:
+    with rubhpc.open(study.output) as store:
         assert "final_state" not in store
         second = store.section_vertical.values.ravel()
     np.testing.assert_allclose(second, whole.section_vertical[2:], rtol=0, atol=1e-9 * 1e-4)
