@@ -4,7 +4,6 @@ import shutil
 
 import numpy as np
 import pytest
-import xarray as xr
 from closed_form import simulate
 from trial_rig import trial_rig
 
