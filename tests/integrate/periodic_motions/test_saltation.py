@@ -95,7 +95,8 @@ BY_STEPS = {
 def test_derivative_by_steps_is_that_of_finite_differences(name, accuracy):
     """Of the change that decays most slowly: no step follows what a damper sets going at a touch."""
     stiff = with_keys(PAPER, {"stator.youngs_modulus": "30 GPa"})
-    motion = motion_of(stiff, 1.1, 0.7, 0.1, BY_STEPS[name], 60, partial(CollocatedMotion, accuracy=accuracy))
+    follow = partial(CollocatedMotion, accuracy=accuracy)
+    motion = motion_of(stiff, 1.1, 0.23, 0.1, BY_STEPS[name], 60, follow)
     revolution = motion.revolve(motion.start, motion.states)
     assert len(revolution.pieces) > 2
     value, shape = np.linalg.eig(motion.monodromy([revolution]))
