@@ -58,6 +58,11 @@ class RecordVariables:
         whirl_ratio: float
         contact_fraction: Floats  # (n_stator,)
         stick_fraction: Floats  # (n_stator,)
+        rub_kind: Floats  # (n_stator,)
+        whirl_frequency: Floats  # (n_stator,); rad s-1
+        contact_angle_mean: Floats  # (n_stator,); rad
+        contact_angle_spread: Floats  # (n_stator,)
+        contact_arc: Floats  # (n_stator,); rad
         reversals_per_revolution: Floats  # (n_stator,)
         contacts_per_revolution: Floats  # (n_stator,)
         contact_duration: Floats  # (n_stator,); s

@@ -72,7 +72,11 @@ from rubhpc.rig.reading import read_rig
 from rubhpc.study.study import Contact, Integrator, Recording
 
 setup = prepare(
-    read_rig("mokhtar2017"), 150.0, contact=Contact(), integrator=Integrator(), samples_per_revolution=32
+    read_rig("mokhtar2017").with_geometry("linear"),
+    150.0,
+    contact=Contact(normal="fixed", friction_law="sliding"),
+    integrator=Integrator(),
+    samples_per_revolution=32,
 )
 compile_kernels(setup, clearance=1e-4, friction=0.3, recording=Recording())
 for path, module in list(sys.modules.items()):

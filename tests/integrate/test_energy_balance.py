@@ -1,4 +1,4 @@
-"""The energy balance of contact modes in closed form: nothing in it is integrated by a rule."""
+"""The energy balance: exact in closed form, and by collocation as good as `accuracy`."""
 
 import math
 from dataclasses import replace
@@ -22,6 +22,7 @@ LAWS = [
     COULOMB | {"restitution": 0.8},
     {"law": "penalty", "stiffness": 1e7, "damping": 100.0},
 ]
+ACCURACY = 1e-5  # of what is computed by collocation
 FEW = {"transient": 10, "revolutions": 6, "samples_per_revolution": 64, "keep": ()}
 
 
@@ -41,10 +42,11 @@ def ring(count):
     ids=["one", "three", "cross-coupled"],
 )
 def test_energy_balances_under_every_law(rig, case, law):
-    record = simulate(rig, **case, **law, **FEW)
-    assert record.measures["scheme"] == 0  # from event to event
+    is_closed = not law.keys() & {"friction_law", "law"}
+    record = simulate(rig, **case, **law, **FEW, accuracy=1e-3 if is_closed else ACCURACY)
+    assert record.measures["scheme"] == (0 if is_closed else 4)  # from event to event, or by collocation
     assert record.contact_impulse.max() > 0.0
-    assert record.energy_residual < 1e-8
+    assert record.energy_residual < (1e-8 if is_closed else ACCURACY)
 
 
 def test_energy_balances_where_a_ring_bounces_thousands_of_times_a_revolution():
@@ -86,9 +88,9 @@ def test_gaps_close_where_bodies_touch(kind, law):
         masses = (LumpedStator(node=3, mass=0.111, stiffness=7.76e6, angle=angle) for angle in angles)
         rig = replace(trial_rig(1), stator=tuple(masses))
         case = {"speed": 49.5, "clearance": "0.88 um", "friction": 0.256}
-    record = simulate(rig, **case, **law, **FEW | {"transient": 0, "revolutions": 1})
+    record = simulate(rig, **case, **law, **FEW | {"transient": 0, "revolutions": 1}, accuracy=ACCURACY)
     assert record.contacts_per_revolution.sum() > 100.0
-    assert record.energy_residual < 4e-7
+    assert record.energy_residual < (ACCURACY if law else 4e-7)
 
 
 @pytest.mark.parametrize("law", [{}, COULOMB], ids=str)
@@ -97,10 +99,11 @@ def test_energy_balances_where_a_loaded_rotor_stands_and_rubs(law):
     walls = tuple(LumpedStator(node=8, rigid=True, radius=0.06, angle=math.pi + at) for at in (-0.7, 0.7))
     rotor = replace(STIFF.rotor, gravity=9.81, load=(Load(node=8, vertical=-300.0),))
     case = {"speed": 20.0, "clearance": "20 um", "friction": 0.8}
-    record = simulate(replace(STIFF, rotor=rotor, stator=walls), **case, **law, **FEW | {"revolutions": 32})
+    given = FEW | {"revolutions": 32, "accuracy": ACCURACY}
+    record = simulate(replace(STIFF, rotor=rotor, stator=walls), **case, **law, **given)
     assert record.contact_fraction == pytest.approx([1.0, 1.0])
     assert record.friction_work.sum() > 10.0
-    assert record.energy_residual < 1e-8
+    assert record.energy_residual < (ACCURACY if law else 1e-8)
 
 
 def test_energy_residual_shows_friction_that_does_not_act(monkeypatch):

@@ -123,7 +123,12 @@ ALL_LAWS += [
 
 @pytest.mark.parametrize("law", ALL_LAWS, ids=lambda law: " ".join(map(str, law.values())))
 def test_two_runs_that_meet_amid_a_contact_are_one(law):
-    """Forces, overlaps and stick follow from the state at the end, and no contact is counted twice."""
+    """Forces, overlaps and stick follow from the state at the end, and no contact is counted twice.
+
+    By collocation the second run takes other steps, as good as `accuracy`.
+    """
+    is_collocated = "method" not in law and law.keys() & {"law", "friction_law", "normal"}
+    rel = 1e-6 if is_collocated else 1e-8
     given = {"speed": 170.0, "clearance": "20 um", "friction": 0.2, "accuracy": 1e-6} | law
     whole = simulate(trial_rig(3), **given, transient=0, revolutions=4)
     first = simulate(trial_rig(3), **given, transient=0, revolutions=3)
@@ -131,13 +136,13 @@ def test_two_runs_that_meet_amid_a_contact_are_one(law):
     second = simulate(trial_rig(3), **given, transient=0, revolutions=1, initial=first.final)
     for name in (*MOTIONS, "contact_force"):
         expected = getattr(whole, name)[..., 768:]
-        assert getattr(second, name) == pytest.approx(expected, rel=0, abs=1e-8 * abs(expected).max()), name
+        assert getattr(second, name) == pytest.approx(expected, rel=0, abs=rel * abs(expected).max()), name
     for name in ("contacts_per_revolution", "contact_impulse"):
         parts = 3 * getattr(first, name) + getattr(second, name)
-        assert parts == pytest.approx(4 * getattr(whole, name), rel=1e-8), name
+        assert parts == pytest.approx(4 * getattr(whole, name), rel=rel), name
     for name in ("rotor_displacement", "rotor_velocity"):
         expected = getattr(whole.final, name)
-        scale = 1e-8 * abs(expected).max()
+        scale = rel * abs(expected).max()
         assert getattr(second.final, name) == pytest.approx(expected, rel=0, abs=scale), name
 
 

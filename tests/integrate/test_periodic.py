@@ -72,7 +72,7 @@ def assert_ends_where_it_starts(state, record):
 @pytest.mark.parametrize("law", LAWS)
 def test_record_ends_where_it_starts(law):
     """Under the penalty in contact, which is closed at the angle 0."""
-    motion = periodic("mokhtar2017", **RUBS, clearance="100 um", **LAWS[law])
+    motion = periodic("mokhtar2017", **RUBS, clearance="100 um", **LAWS[law], accuracy=1e-7)
     assert_ends_where_it_starts(motion.state, motion.record)
     assert bool(motion.state.contact_force.any()) == ("penalty" in law)
     if law == "penalty":
@@ -81,8 +81,9 @@ def test_record_ends_where_it_starts(law):
 
 def test_records_of_a_branch_end_where_they_start():
     (found,) = branch(
-        "mokhtar2017", **RUBS, along="clearance", start="100 um", stop="98 um", largest_step="2 um", **SOFT
-    )
+        "mokhtar2017", **RUBS, along="clearance", start="100 um", stop="98 um", largest_step="2 um", **SOFT,
+        accuracy=1e-7,
+    )  # fmt: skip
     for i, point in enumerate(found.points):
         assert point.state.contact_force.any()
         assert_ends_where_it_starts(point.state, found.record(i))

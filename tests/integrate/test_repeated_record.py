@@ -77,7 +77,7 @@ def test_a_repeated_record_is_the_one_that_is_marched(monkeypatch, motion, perio
 
 @pytest.mark.parametrize(
     ("law", "clearance_ratio"),
-    [({}, 0.7), ({"friction_law": "coulomb"}, 0.7), ({"law": "penalty", "stiffness": 3e6}, 0.5)],
+    [({}, 0.7), ({"restitution": 0.3}, 0.7)],
 )
 def test_laws_rings_loads_and_probes(monkeypatch, law, clearance_ratio):
     probes = [

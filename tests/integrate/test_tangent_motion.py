@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from closed_form import Contact, read_rig, simulate
+from closed_form import Contact, simulate
 from trial_rig import trial_rig
 
 from rubhpc import LumpedStator
@@ -13,7 +13,6 @@ from rubhpc.integrate import tangent_motion
 from rubhpc.integrate.case import MARCHES
 from rubhpc.integrate.marches import met_modes
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
-from rubhpc.integrate.measuring.regimes import N_ALL
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.periodic_motions.saltation import carried
 from rubhpc.integrate.periodic_motions.shooting import shoot
@@ -22,8 +21,6 @@ from rubhpc.integrate.setup import prepare
 from rubhpc.integrate.tangent_motion import TangentMotion, _ModesOfTrail, _motion_at
 from rubhpc.integrate.transient import pass_revolutions
 from rubhpc.kernels import trail
-from rubhpc.kernels.case_progress import CONTACT_UNSOLVED
-from rubhpc.rig.reading import with_keys
 from rubhpc.study.study import Integrator, Recording
 
 SPEED, CLEARANCE, FRICTION, N_REVOLUTION = 170.0, 80e-6, 0.2, 6
@@ -165,27 +162,6 @@ def test_on_a_periodic_motion_it_is_the_monodromy_matrix(law):
     assert sum(found[32:]) == pytest.approx(128 * math.log(abs(orbit.multipliers[0])), abs=4.0)
 
 
-def test_after_collocation_it_goes_on_beside_a_second_motion(monkeypatch):
-    """One revolution by collocation breaks the trail: two motions then part as the multipliers say."""
-    law, rig, speed = LAWS[2], trial_rig(2), 230.0
-    setup, start = prepared(rig, speed, law)
-    final = ended(rig, speed, 100, law)
-    _, orbit = solved(setup, final)
-    kernel, n_call = EventDrivenMarch._kernel, 0
-
-    def left_once(march, *args):
-        nonlocal n_call
-        n_call += 1
-        return CONTACT_UNSOLVED if n_call == 1 else kernel(march, *args)
-
-    monkeypatch.setattr(EventDrivenMarch, "_kernel", left_once)
-    tangent = TangentMotion(start, final, setup, Recording(samples_per_revolution=64))
-    found = [tangent.part(4) / 4 for _ in range(24)]
-    assert tangent._march.n_left == 1
-    assert n_call > N_ALL // 4  # marches of two motions, span by span
-    assert np.mean(found) == pytest.approx(math.log(abs(orbit.multipliers[0])), abs=0.02)
-
-
 def recorded(rig, speed, law, clearance, n_revolution):
     """A march from the end of a transient through a record, and the trail of that."""
     given = {"clearance": clearance, "friction": FRICTION, "samples_per_revolution": 64, "keep": ()}
@@ -207,14 +183,3 @@ def test_a_motion_is_read_from_its_trail(law):
     ticks = march.clock.samples_per_revolution << march.clock.sample_level
     assert noted.n_event[0] > 0
     assert _motion_at(noted, march, ticks) == pytest.approx(march.motion(), rel=1e-9, abs=1e-12)
-
-
-def test_on_a_torus_it_neither_grows_nor_decays_within_a_record():
-    """The exponent along a torus is zero; slow modes of three stators decay by 0.15 a revolution."""
-    rig = with_keys(read_rig("mokhtar2017"), {"stator.youngs_modulus": "30 GPa"})
-    rig = replace(rig, stator=tuple(replace(rig.stator[0], angle=2.0 * math.pi * i / 3) for i in range(3)))
-    speed = 2.6 * 2.0 * math.pi * 31.5596
-    setup, march, noted, recording = recorded(rig, speed, LAWS[2], 40e-6, 40)
-    tangent = TangentMotion(lambda state: march, march.final(), setup, recording, noted, march)
-    assert len(tangent.within) == (40 - 16) // 4
-    assert np.mean(tangent.within) == pytest.approx(0.0, abs=0.02)

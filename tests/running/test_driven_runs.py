@@ -58,7 +58,7 @@ def test_cases_are_those_of_the_function(folder):
         "inertia": 0.002,
     }
     keys = {"clearance": "100 um", "friction": 0.2, "samples_per_revolution": 32}
-    alone = rubhpc.run_up("mokhtar2017", drive=drive, **keys)
+    alone = rubhpc.run_up("mokhtar2017", drive=drive, **keys, model="mokhtar2017")
     assert alone.contact_fraction.max() > 0.0
     for name in ("speed", "time", "amplitude_vertical"):
         assert np.array_equal(case[name].values, alone[name].values), name

@@ -84,6 +84,7 @@ def test_cases_are_those_of_the_function(folder):
         friction=0.2,
         samples_per_revolution=32,
         probes=[{"name": "left", "node": 1, "angle": "-45 deg"}],
+        model="mokhtar2017",
     )
     n = alone.sizes["revolution"]
     assert n == 8

@@ -35,7 +35,10 @@ def record(recording: Recording, friction: float, status: int = DONE, reason: st
         signals=waveforms,
         spectra={f"spectrum_{name}": values[..., :n_order] for name, values in waveforms.items()},
         sections={f"section_{name}": np.full(recording.revolutions, friction) for name in SECTION_NAMES},
-        measures={v.name: np.array([friction]) if "stator" in v.dims else 7 for v in case_measures()}
+        measures={
+            v.name: 7 if "stator" not in v.dims else np.array([0 if "int" in v.dtype else friction])
+            for v in case_measures()
+        }
         | {"energy_residual": 1e-6},
         final=None,  # type: ignore[arg-type]
     )

@@ -10,6 +10,8 @@ from test_coulomb import PRESSED, pressed_onto_a_rim
 
 from rubhpc import Rig
 from rubhpc.errors import InputError
+from rubhpc.kernels import laws
+from rubhpc.kernels._jit import plain
 from rubhpc.rig.rotors import Load
 from rubhpc.rig.stators import LumpedStator
 
@@ -174,9 +176,10 @@ def test_keys_that_do_not_agree_are_refused(given, message):
 
 
 def test_kernel_and_python_interpolate_alike():
-    from rubhpc.kernels._jit import plain
-    from rubhpc.kernels.laws import interpolated
-
     at, values = np.array([0.0, 0.3, 0.8]), np.array([1.8, 1.5, 0.9])
-    for x in (0.0, 0.1, 0.3, 0.79, 0.8, 5.0, math.pi):
-        assert plain(interpolated)(at, values, x) == pytest.approx(np.interp(x, at, values), rel=1e-15)
+    law = laws.Law(friction_law=laws.TABLE, slip_speed=at, friction_ratio=values)
+    for x in (0.0, 0.1, -0.2, 0.3, 0.79, 0.8, 5.0, -math.pi):
+        ratio, slope = plain(laws.sliding_friction)(law, 0.5, x)
+        assert ratio == pytest.approx(0.5 * np.interp(abs(x), at, values), rel=1e-15)
+        beside = plain(laws.sliding_friction)(law, 0.5, x + 1e-6)[0]
+        assert slope == pytest.approx((beside - ratio) / 1e-6, abs=1e-9)
