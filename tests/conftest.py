@@ -80,7 +80,6 @@ SLOW = (
     "integrate/changing_speed/test_run_up_machines.py",
     "integrate/changing_speed/test_steep_run_ups.py",
     "integrate/test_simulate.py::test_energy_balances[3-",
-    "integrate/test_tangent_motion.py::test_after_collocation",
     "integrate/test_tangent_motion.py::test_tangent_is_that_of_the_saltation_matrices[ring",
     "integrate/test_transient.py::test_laws_without_closed_form_settle_as_with_auto",
     "kernels/test_accumulators.py",
