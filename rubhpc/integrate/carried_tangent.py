@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.lyapunov import N_ALIGNING, count_followed
+from rubhpc.integrate.lyapunov import N_ALIGNING
 from rubhpc.integrate.measuring.regimes import N_MOST
 from rubhpc.kernels.case_progress import FINISHED
 from rubhpc.kernels.collocation.tangent import FULL
@@ -43,7 +43,6 @@ class CarriedTangent:
             self._column = trail.columns
             size = self._scale()
             grown += math.log(size) if size > 0.0 else -math.inf
-        count_followed(n_revolution)
         return grown
 
     def _scale(self) -> float:

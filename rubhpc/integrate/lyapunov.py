@@ -25,22 +25,10 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-_followed = [0]
-
 SPAN = 4  # revolutions: few enough that neighbours stay close
 N_ALIGNING = 4  # spans in which the displacement turns into the direction of largest growth
 DISPLACED = 1e-5  # of the motion: far above the resolution of events, far below details of the motion
 LOST = 1e-6  # of the displacement: less is rounding
-
-
-def n_followed() -> int:
-    """Revolutions that this process has followed after records so far; of two motions, those of both."""
-    return _followed[0]
-
-
-def count_followed(n_revolution: int) -> None:
-    """Add to `n_followed`."""
-    _followed[0] += n_revolution
 
 
 class Neighbours(Protocol):
@@ -133,7 +121,6 @@ class Marches:
             march = self._started(k, state)
             if pass_revolutions(march, self._recording, n_revolution) is not None:
                 return None
-            count_followed(n_revolution)
             ends.append(march.final())
         self._state, self._other = ends
         ratio = self._distance(self._state, self._other) / self._size

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.lyapunov import N_ALIGNING, SPAN, Marches, count_followed
+from rubhpc.integrate.lyapunov import N_ALIGNING, SPAN, Marches
 from rubhpc.integrate.measuring.regimes import N_ALL, N_FIRST, N_MOST
 from rubhpc.integrate.transient import pass_revolutions
 from rubhpc.kernels.tangent import ALL_CARRIED, PIECE, TrailModes, carry_along, new_tangent
@@ -134,7 +134,6 @@ class TangentMotion:
         before, self._state = self._state, march.final()
         if self._carry(trail, first, n_revolution):
             self._n_passed += n_revolution
-            count_followed(n_revolution)
             self._leave_room(trail, n_revolution)
             return True
         if march.n_left == n_left and n_revolution > 1:  # no room for their events

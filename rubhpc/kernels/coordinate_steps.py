@@ -25,37 +25,11 @@ def floor_log2(count: int) -> int:
 
 
 @linked_sum
-def go_on(
-    count: int, power_re: Floats, power_im: Floats, z_re: Floats, z_im: Floats, re: Floats, im: Floats
-) -> None:
-    """Fill `re` and `im` (m,) with modal coordinates `count` ticks later, at least one.
+def turn_on(count: int, power_re: Floats, power_im: Floats, z_re: Floats, z_im: Floats) -> None:
+    """Advance modal coordinates (m,) by `count` ticks in place.
 
     `power` (n_level, m) are the exponentials of a contact mode. The shortest steps come first, two at a time.
     """
-    level = lowest_level(count)
-    rest = count >> (level + 1)
-    a_re, a_im = power_re[level], power_im[level]
-    if rest == 0:
-        for k in range(z_re.size):
-            x, y = z_re[k], z_im[k]
-            re[k] = a_re[k] * x - a_im[k] * y
-            im[k] = a_re[k] * y + a_im[k] * x
-        return
-    level += 1 + lowest_level(rest)
-    b_re, b_im = power_re[level], power_im[level]
-    for k in range(z_re.size):
-        x, y = z_re[k], z_im[k]
-        u, v = a_re[k] * x - a_im[k] * y, a_re[k] * y + a_im[k] * x
-        re[k] = b_re[k] * u - b_im[k] * v
-        im[k] = b_re[k] * v + b_im[k] * u
-    rest = count >> (level + 1)
-    if rest != 0:
-        turn_on(rest << (level + 1), power_re, power_im, re, im)
-
-
-@linked_sum
-def turn_on(count: int, power_re: Floats, power_im: Floats, z_re: Floats, z_im: Floats) -> None:
-    """Advance modal coordinates (m,) by `count` ticks in place, as `go_on`."""
     level, rest = 0, count
     while rest != 0:
         shift = lowest_level(rest)

@@ -30,6 +30,41 @@ def take_units(owner: Any, law: str, key_of_law: str) -> None:
             object.__setattr__(owner, key, float(given))
 
 
+def stiffness_key() -> Any:
+    """Declare the key `stiffness` of a table with such a law."""
+    return quantity(
+        "N/m",
+        doc="Stiffness of the penalty; of Hertz's law in N/m^1.5.",
+        example='"1e8 N/m"',
+        default=None,
+        above=0,
+        or_unit="N/m^1.5",
+    )
+
+
+def damping_key() -> Any:
+    """Declare the key `damping` of a table with such a law."""
+    return quantity(
+        "N*s/m",
+        doc="Damping of the penalty; of Hertz's law in s/m: force times rate of penetration.",
+        example='"100 N*s/m"',
+        default=None,
+        at_least=0,
+        or_unit="s/m",
+    )
+
+
+def restitution_key() -> Any:
+    """Declare the key `restitution` of a table with such a law."""
+    return quantity(
+        "",
+        doc="Normal velocity after an impact over that before it, 0 to 1; by default none.",
+        example="0.7",
+        default=None,
+        at_least=0,
+    )
+
+
 @dataclass(frozen=True, kw_only=True)
 class NormalLaw:
     """Contact law of a stator."""
@@ -40,29 +75,9 @@ class NormalLaw:
         of=LAWS,
         default="lagrange",
     )
-    stiffness: float | None = quantity(
-        "N/m",
-        doc="Stiffness of the penalty; of Hertz's law in N/m^1.5.",
-        example='"1e8 N/m"',
-        default=None,
-        above=0,
-        or_unit="N/m^1.5",
-    )
-    damping: float | None = quantity(
-        "N*s/m",
-        doc="Damping of the penalty; of Hertz's law in s/m: force times rate of penetration.",
-        example='"100 N*s/m"',
-        default=None,
-        at_least=0,
-        or_unit="s/m",
-    )
-    restitution: float | None = quantity(
-        "",
-        doc="Normal velocity after an impact over that before it, 0 to 1; by default none.",
-        example="0.7",
-        default=None,
-        at_least=0,
-    )
+    stiffness: float | None = stiffness_key()
+    damping: float | None = damping_key()
+    restitution: float | None = restitution_key()
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TypedDict
 
 from rubhpc.input.fields import FieldError, check_fields, choice, quantity, series
 from rubhpc.models import MODELS, chosen, default_of
-from rubhpc.rig.normal_law import LAWS, take_units
+from rubhpc.rig.normal_law import LAWS, damping_key, restitution_key, stiffness_key, take_units
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -43,29 +43,9 @@ class ContactKeys:
         of=LAWS,
         default="lagrange",
     )
-    stiffness: float | None = quantity(
-        "N/m",
-        doc="Stiffness of the penalty; of Hertz's law in N/m^1.5.",
-        example='"1e8 N/m"',
-        default=None,
-        above=0,
-        or_unit="N/m^1.5",
-    )
-    damping: float | None = quantity(
-        "N*s/m",
-        doc="Damping of the penalty; of Hertz's law in s/m: force times rate of penetration.",
-        example='"100 N*s/m"',
-        default=None,
-        at_least=0,
-        or_unit="s/m",
-    )
-    restitution: float | None = quantity(
-        "",
-        doc="Normal velocity after an impact over that before it, 0 to 1; by default none.",
-        example="0.7",
-        default=None,
-        at_least=0,
-    )
+    stiffness: float | None = stiffness_key()
+    damping: float | None = damping_key()
+    restitution: float | None = restitution_key()
     friction_law: str = choice(
         doc="Friction law: steady sliding in the sense of the spin; or, with stick, Coulomb's law, "
         "Stribeck's, whose coefficient decays with the slip speed, or a table over the slip speed; "

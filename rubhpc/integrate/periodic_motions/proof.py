@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.lyapunov import count_followed
 from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.measuring.orbit_measures import PERIOD_TOLERANCE, closest_return
 from rubhpc.integrate.measuring.regimes import MOST_DOUBLED, MOST_EVENTS, Solution
@@ -62,11 +61,6 @@ class Solver:
         self._march = march
         self.followed: tuple[Floats, State] | None = None  # energies at revolutions, and the end
 
-    @property
-    def has_begun(self) -> bool:
-        """Whether it has been asked for a motion."""
-        return self._piecewise is not None
-
     def __call__(self, period: int) -> Solution | None:
         """Return the motion that closes after this many revolutions, or fewer; None where none is found."""
         try:
@@ -109,7 +103,6 @@ class Solver:
                 if reason is not None:
                     return
                 n_on += n_revolution
-                count_followed(n_revolution)
                 weights = _energy(setup, passed)
                 energy.append(passed**2 @ weights)
                 period, apart = _return_of(passed, weights)
