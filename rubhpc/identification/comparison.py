@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 # Relative errors of the model's lines that are thought possible, equally likely; what they are is learnt too.
-DISCREPANCIES = np.geomspace(1e-3, 0.3, 7)
-ACCURACY = 1e-3  # of a simulated signal, of its rms: no line is compared more closely
+DISCREPANCIES = np.geomspace(3e-5, 0.3, 9)
+LEAST = 0.03  # of the rms of its signal: even a smaller line has the error of one of that size
 WHOLE = 8.0  # order up to which every line is compared
 NEAR = 0.2  # of a natural frequency, within which lines above that are compared too
 _PERIODS = (6, 12, 10, 14, 8, 16, 18, 22, 26)  # revolutions that hold whole periods; 6 of 1, 2 and 3

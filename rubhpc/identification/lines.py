@@ -6,14 +6,15 @@ revolutions, which is unknown as long as the motion repeats every few of them; e
 integrated over. The errors of real and imaginary part are Gaussian and independent of line and channel, with
 the variance
 
-    |noise|^2 + |scatter|^2 + (discrepancy |m|)^2 + (accuracy rms)^2
+    |noise|^2 + |scatter|^2 + discrepancy^2 (|m|^2 + (0.03 rms)^2)
 
-where the noise is that of the measured lines between those of the orders compared, within half an order, and
+with the rms of the signal. The noise is that of the measured lines between those of the orders compared, within half an order, and
 the scatter the same of the simulation: it is 0 of a motion that repeats.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import TYPE_CHECKING
 
@@ -21,8 +22,8 @@ import numpy as np
 from scipy.special import logsumexp
 
 from rubhpc.identification.comparison import (
-    ACCURACY,
     DISCREPANCIES,
+    LEAST,
     Seen,
     likeliest,
     lines_of,
@@ -65,7 +66,7 @@ class LineComparison:
         self.orders = self._kept / period
         self.measured = self._seen(channels.waves)
         size = np.std(channels.waves, axis=1)
-        self._floor = (ACCURACY * size[:, None]) ** 2
+        self._least = (LEAST * size[:, None]) ** 2
         self.about = (
             f"it repeats: {self.orders.size} lines of each signal are compared by amplitude and phase, up to "
             f"{self.orders[-1]:.3g}X in steps of 1/{period}X"
@@ -105,7 +106,8 @@ class LineComparison:
         if self._is_absolute:
             turned = logsumexp(gain, axis=1) - math.log(self._period)
         else:
-            turned = np.array([self._over_angles(*pair) for pair in zip(product, gain, strict=True)])
+            pairs = zip(product, gain, strict=True)
+            turned = np.array([logsumexp(top, b=share) for top, share in itertools.starmap(self._peaks, pairs)])
         return np.asarray(turned - apart.sum(axis=(1, 2)))
 
     def _apart(
@@ -116,8 +118,8 @@ class LineComparison:
         The lines of unknown forces have no part in them.
         """
         lines, model = self.measured.values, seen.values
-        error = (discrepancies[:, None, None] * np.abs(model)) ** 2
-        variance = self.measured.variance + seen.variance + self._floor + error
+        error = discrepancies[:, None, None] ** 2 * (np.abs(model) ** 2 + self._least)
+        variance = self.measured.variance + seen.variance + error
         apart = (np.abs(lines) ** 2 + np.abs(model) ** 2) / variance + np.log(np.pi * variance)
         products = np.conj(lines) * model / variance
         if unknown is not None and (at := self._at(unknown)) is not None:
@@ -136,21 +138,21 @@ class LineComparison:
         logs = np.log(np.pi * variance)
         if unknown is not None and (at := self._at(unknown)) is not None:
             logs[:, :, at] = 0.0
-        gain = 2.0 * np.real(product @ self._turned).max()
-        return float(((apart - logs).sum() - gain) / apart.size)
+        gain = 2.0 * np.real(product @ self._turned)
+        best = (gain if self._is_absolute else self._peaks(product[0], gain[0])[0]).max()
+        return float(((apart - logs).sum() - best) / apart.size)
 
     def amplitudes(self, seen: Seen) -> tuple[Floats, Floats]:
         """Return the amplitudes of the lines and of their noise, (n_channel, n_line)."""
         return np.abs(seen.values), np.sqrt(seen.variance)
 
-    def _over_angles(self, product: Lines, gain: Floats) -> float:
-        """Integral over the angle by Laplace's method at each maximum, logarithmic."""
+    def _peaks(self, product: Lines, gain: Floats) -> tuple[Floats, Floats]:
+        """Maxima over the angle, and the shares of all angles whose sum is the integral (Laplace's method)."""
         whole = 2.0 * math.pi * self._period
-        at = np.flatnonzero(
-            (gain >= np.roll(gain, 1)) & (gain > np.roll(gain, -1)) & (gain > gain.max() - _DEEP)
-        )
-        angles = self._angles[at]
         step = self._angles[1]
+        higher = self.orders**2 @ np.abs(product) * (0.5 * step) ** 2  # at most, between the trial angles
+        is_top = (gain >= np.roll(gain, 1)) & (gain > np.roll(gain, -1))
+        angles = self._angles[is_top & (gain > gain.max() - _DEEP - higher)]
         for _ in range(_NEWTON):
             turned = product[:, None] * np.exp(1j * np.outer(self.orders, angles))
             slope = -2.0 * np.imag(self.orders @ turned)
@@ -158,8 +160,7 @@ class LineComparison:
             angles = angles - np.clip(slope / bend, -0.5 * step, 0.5 * step)
         turned = product[:, None] * np.exp(1j * np.outer(self.orders, angles))
         bend = np.maximum(2.0 * np.real(self.orders**2 @ turned), 2.0 * math.pi / whole**2)
-        widths = np.sqrt(2.0 * math.pi / bend)
-        return float(logsumexp(2.0 * np.real(turned.sum(axis=0)), b=widths / whole))
+        return 2.0 * np.real(turned.sum(axis=0)), np.sqrt(2.0 * math.pi / bend) / whole
 
 
 def _over_forces(lines: Lines, variance: Floats, unknown: Unknown) -> float:

@@ -46,8 +46,9 @@ def noisy(turned=0.0, seed=1):
 def brute_force(comparison, seen, angles):
     """The same by the residuals themselves, at every angle."""
     size = DISCREPANCIES[:, None, None, None]
-    floor = (1e-3 * noisy().std(axis=1)[:, None]) ** 2
-    variance = comparison.measured.variance + seen.variance + floor + (size * np.abs(seen.values)) ** 2
+    least = 0.03 * noisy().std(axis=1)[:, None]
+    error = size**2 * (np.abs(seen.values) ** 2 + least**2)
+    variance = comparison.measured.variance + seen.variance + error
     model = seen.values * np.exp(1j * comparison.orders * angles[:, None, None])
     apart = np.abs(comparison.measured.values - model) ** 2 / variance + np.log(np.pi * variance)
     terms = -apart.sum(axis=(2, 3))
@@ -96,7 +97,7 @@ def test_unknown_forces_are_integrated_over():
     sizes = rng.choice(unknown.sizes, 40000)
     forces = sizes * (rng.standard_normal(40000) + 1j * rng.standard_normal(40000)) / np.sqrt(2)
     at = int(np.flatnonzero(lines.orders == 2.0)[0])
-    variance = lines.measured.variance[:, at] + (1e-3 * waves.std(axis=1)) ** 2
+    variance = lines.measured.variance[:, at]
     apart = lines.measured.values[:, at, None] - shapes * forces
     alone = -(np.abs(apart) ** 2 / variance[:, None] + np.log(np.pi * variance)[:, None]).sum(axis=0)
     zero = -(np.abs(lines.measured.values[:, at]) ** 2 / variance + np.log(np.pi * variance)).sum()
