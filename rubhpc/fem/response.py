@@ -97,11 +97,29 @@ def harmonic_response(
         ) from None
 
 
+def steady_lines(model: Model, spin: float) -> dict[int, NDArray[np.complex128]]:
+    """Return the steady responses of the rotor (n_dof,) by order: to the unbalance, 1, and to harmonics."""
+    lines = {1: steady_response(model, spin)}
+    for order, force in model.harmonics:
+        lines[order] = lines.get(order, 0.0) + harmonic_response(model, spin, order, force)
+    return lines
+
+
+def _orbit(model: Model, spin: float, node: int) -> NDArray[np.float64]:
+    """Steady v and w of a node over a turn of the shaft, (2, n_phase), m."""
+    turn, found = np.exp(2j * np.pi * np.arange(PHASES) / PHASES), np.zeros((2, PHASES))
+    for order, line in steady_lines(model, spin).items():
+        for moved, name in zip(found, ("v", "w"), strict=True):
+            row = model.rotor.index(node, name)
+            moved += (line[row] * turn**order).real if row >= 0 else 0.0
+    return found
+
+
 def contact_free_amplitude(model: Model, spin: float, node: int | None = None) -> float:
     """Return the largest deflection `sqrt(v^2 + w^2)` of the steady contact-free orbit, m.
 
     The orbit is the sum of a forward circle of radius |F| and a backward circle of radius |B|: an ellipse
-    with the major semi-axis |F| + |B|.
+    with the major semi-axis |F| + |B|. Of harmonics the orbit is followed over a turn.
 
     Parameters
     ----------
@@ -112,6 +130,8 @@ def contact_free_amplitude(model: Model, spin: float, node: int | None = None) -
         Default: the model's output node.
     """
     node = model.output_node if node is None else node
+    if model.harmonics:
+        return float(np.hypot(*_orbit(model, spin, node)).max())
     response = steady_response(model, spin)
     rows = [model.rotor.index(node, name) for name in ("v", "w")]
     v, w = (response[row] if row >= 0 else 0.0 for row in rows)
@@ -135,12 +155,13 @@ def contact_free_reach(model: Model, spin: float) -> float:
     nearer, aside = sag_at_stators(model)
     reach = -math.inf
     for stator, sag, off in zip(model.stators, nearer, aside, strict=True):
-        rows = [model.rotor.index(stator.node, name) for name in ("v", "w")]
-        v, w = (response[row] if row >= 0 else 0.0 for row in rows)
-        if stator.is_bore:
-            turn = np.exp(2j * np.pi * np.arange(PHASES) / PHASES)
-            away = np.abs((v * turn).real + sag + 1j * ((w * turn).real - off)).max()
+        if stator.is_bore or model.harmonics:
+            v, w = _orbit(model, spin, stator.node)
+            along = v * math.cos(stator.angle) + w * math.sin(stator.angle)
+            away = np.abs(v + sag + 1j * (w - off)).max() if stator.is_bore else along.max() + sag
         else:
+            rows = [model.rotor.index(stator.node, name) for name in ("v", "w")]
+            v, w = (response[row] if row >= 0 else 0.0 for row in rows)
             away = abs(v * math.cos(stator.angle) + w * math.sin(stator.angle)) + sag
         reach = max(reach, float(away) - stator.clearance_offset)
     return reach

@@ -8,8 +8,8 @@ the variance
 
     |noise|^2 + |scatter|^2 + discrepancy^2 (|m|^2 + (0.03 rms)^2)
 
-with the rms of the signal. The noise is that of the measured lines between those of the orders compared, within half an order, and
-the scatter the same of the simulation: it is 0 of a motion that repeats.
+with the rms of the signal. The noise is that of the measured lines between those of the orders compared,
+within half an order, and the scatter the same of the simulation: it is 0 of a motion that repeats.
 """
 
 from __future__ import annotations
@@ -107,7 +107,9 @@ class LineComparison:
             turned = logsumexp(gain, axis=1) - math.log(self._period)
         else:
             pairs = zip(product, gain, strict=True)
-            turned = np.array([logsumexp(top, b=share) for top, share in itertools.starmap(self._peaks, pairs)])
+            turned = np.array(
+                [logsumexp(top, b=share) for top, share in itertools.starmap(self._peaks, pairs)]
+            )
         return np.asarray(turned - apart.sum(axis=(1, 2)))
 
     def _apart(
@@ -147,7 +149,7 @@ class LineComparison:
         return np.abs(seen.values), np.sqrt(seen.variance)
 
     def _peaks(self, product: Lines, gain: Floats) -> tuple[Floats, Floats]:
-        """Maxima over the angle, and the shares of all angles whose sum is the integral (Laplace's method)."""
+        """Maxima over the angle, and the share of all angles that each stands for (Laplace's method)."""
         whole = 2.0 * math.pi * self._period
         step = self._angles[1]
         higher = self.orders**2 @ np.abs(product) * (0.5 * step) ** 2  # at most, between the trial angles
