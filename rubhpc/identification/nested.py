@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 _QUEUE = 8
+_SPARSE = 30.0  # per cent of the points that are accepted, below which they are drawn within bounds
 _PRECISION = 0.1  # of ln(evidence) that is left when the sampling ends
 
 
@@ -125,6 +126,7 @@ def sample(
                 rstate=np.random.default_rng(seed),
                 pool=mapper,
                 queue_size=_QUEUE,
+                first_update={"min_eff": _SPARSE},
             )
         except RuntimeError:
             raise InputError("identify: no case of the prior can be computed; narrow the priors") from None
