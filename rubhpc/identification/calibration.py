@@ -234,7 +234,7 @@ def _measured(trial: Trial, known: Known) -> tuple[Floats, xr.Dataset]:
         return truth, measured(
             path,
             time={"column": "time"},
-            speed={"column": "key_phasor", "level": 2.5},
+            speed={"column": "key_phasor", "level": 2.5, "angle": 0.0},
             signals={name: {"unit": str(signals[name].attrs["units"])} for name in trial.signals},
         )
 

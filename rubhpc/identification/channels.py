@@ -26,6 +26,8 @@ _BAND = 0.4  # of the sampling rate: beyond, the filter of the logger has taken 
 _FEWEST = 24  # revolutions
 _MOVED = "measured_"  # what probes at the node of a measured orbit are called
 _ANGLES = {"vertical": 0.0, "horizontal": 0.5 * math.pi}
+_POINTING = math.radians(1.0)  # by which the direction of a key-phasor is known
+_PLACED = 0.3  # of a sample, by which its pulses are placed (standard deviation)
 _SLIP = 0.02  # by which a speed that is given may be wrong
 _HARMONICS = 4  # by which the true speed is found
 _TRIALS = 20  # a bin of the spectrum
@@ -52,8 +54,9 @@ class Channels:
         rad/s.
     highest_order : float
         Up to which the data logger can see.
-    is_absolute : bool
-        Whether the angle of the shaft, and with it every phase, is that of a simulation.
+    angle_error : float
+        rad, standard deviation of the angle of the shaft, by which phases are those of a simulation; infinite
+        where it is unknown.
     """
 
     names: tuple[str, ...]
@@ -65,7 +68,7 @@ class Channels:
     n: int
     spin: float
     highest_order: float
-    is_absolute: bool
+    angle_error: float
 
     @property
     def revolutions(self) -> int:
@@ -123,12 +126,14 @@ def channels_of(measured: xr.Dataset) -> Channels:
         problem = f"has {revolutions} revolutions, fewer than {_FEWEST}"
         raise InputError(f"{where}: {problem}; give a longer record")
     spin = float(measured["spin_speed"])
-    is_absolute = bool(measured.attrs.get("has_absolute_phase", 0))
+    rate = float(measured.attrs.get("rate", math.inf))
     waves = np.stack([measured[name].values.astype(float) for name in names])
-    if not is_absolute:  # the speed may be a nominal one
+    if measured.attrs.get("has_absolute_phase", 0):
+        angle_error = math.hypot(_POINTING, _PLACED * spin / rate)
+    else:  # the speed may be a nominal one
         slip = _slip(waves, n)
-        spin, waves = spin * slip, _turned_by(waves, n, slip)
-    seen = _BAND * min(float(measured.attrs.get("rate", math.inf)) * 2.0 * math.pi / spin, n)
+        spin, waves, angle_error = spin * slip, _turned_by(waves, n, slip), math.inf
+    seen = _BAND * min(rate * 2.0 * math.pi / spin, n)
     return Channels(
         names=tuple(names),
         simulated=tuple(simulated),
@@ -139,7 +144,7 @@ def channels_of(measured: xr.Dataset) -> Channels:
         n=n,
         spin=spin,
         highest_order=seen,
-        is_absolute=is_absolute,
+        angle_error=angle_error,
     )
 
 

@@ -2,9 +2,9 @@
 
 A measured line is `d = m exp(i k theta) + noise`, with m that of the model, k its order, and theta by how far
 the model's revolution has to be turned. Where the angle of the shaft is known theta is a number of whole
-revolutions, which is unknown as long as the motion repeats every few of them; else it is any angle. It is
-integrated over. The errors of real and imaginary part are Gaussian and independent of line and channel, with
-the variance
+revolutions, which is unknown as long as the motion repeats every few of them, within the error of that angle;
+else it is any angle. It is integrated over. The errors of real and imaginary part are Gaussian and
+independent of line and channel, with the variance
 
     |noise|^2 + |scatter|^2 + discrepancy^2 (|m|^2 + (0.03 rms)^2)
 
@@ -60,7 +60,7 @@ class LineComparison:
     """
 
     def __init__(self, channels: Channels, period: int, natural: Sequence[float]) -> None:
-        self._n, self._period, self._is_absolute = channels.n, period, channels.is_absolute
+        self._n, self._period, self._angle_error = channels.n, period, channels.angle_error
         orders = np.arange(1, math.floor(channels.highest_order * period) + 1) / period
         self._kept = np.flatnonzero(wanted_orders(orders, natural, channels.highest_order)) + 1
         self.orders = self._kept / period
@@ -71,9 +71,13 @@ class LineComparison:
             f"it repeats: {self.orders.size} lines of each signal are compared by amplitude and phase, up to "
             f"{self.orders[-1]:.3g}X in steps of 1/{period}X"
         )
-        n_angle = period if self._is_absolute else period * math.ceil(_FINE * self.orders[-1])
+        n_angle = period * (1 if self._is_absolute else math.ceil(_FINE * self.orders[-1]))
         self._angles = 2.0 * math.pi * period / n_angle * np.arange(n_angle)
         self._turned = np.exp(1j * np.outer(self.orders, self._angles))
+
+    @property
+    def _is_absolute(self) -> bool:
+        return math.isfinite(self._angle_error)
 
     def _seen(self, waves: Floats) -> Seen:
         """Lines at the orders compared, and the mean power of those between them."""
@@ -103,13 +107,8 @@ class LineComparison:
             apart = apart + 0.0
             apart[:, 0, at] = -_over_forces(self.measured.values[:, at], variance[0, :, at], unknown)
         gain = 2.0 * np.real(product @ self._turned)
-        if self._is_absolute:
-            turned = logsumexp(gain, axis=1) - math.log(self._period)
-        else:
-            pairs = zip(product, gain, strict=True)
-            turned = np.array(
-                [logsumexp(top, b=share) for top, share in itertools.starmap(self._peaks, pairs)]
-            )
+        peaks = itertools.starmap(self._peaks, zip(product, gain, strict=True))
+        turned = np.array([logsumexp(top, b=share) for top, share in peaks])
         return np.asarray(turned - apart.sum(axis=(1, 2)))
 
     def _apart(
@@ -141,8 +140,8 @@ class LineComparison:
         if unknown is not None and (at := self._at(unknown)) is not None:
             logs[:, :, at] = 0.0
         gain = 2.0 * np.real(product @ self._turned)
-        best = (gain if self._is_absolute else self._peaks(product[0], gain[0])[0]).max()
-        return float(((apart - logs).sum() - best) / apart.size)
+        best, _ = self._peaks(product[0], gain[0])
+        return float(((apart - logs).sum() - best.max()) / apart.size)
 
     def amplitudes(self, seen: Seen) -> tuple[Floats, Floats]:
         """Return the amplitudes of the lines and of their noise, (n_channel, n_line)."""
@@ -150,19 +149,25 @@ class LineComparison:
 
     def _peaks(self, product: Lines, gain: Floats) -> tuple[Floats, Floats]:
         """Maxima over the angle, and the share of all angles that each stands for (Laplace's method)."""
-        whole = 2.0 * math.pi * self._period
-        step = self._angles[1]
-        higher = self.orders**2 @ np.abs(product) * (0.5 * step) ** 2  # at most, between the trial angles
-        is_top = (gain >= np.roll(gain, 1)) & (gain > np.roll(gain, -1))
-        angles = self._angles[is_top & (gain > gain.max() - _DEEP - higher)]
+        if self._is_absolute:
+            reach, stiff = self._angle_error, self._angle_error**-2
+            whole = math.sqrt(2.0 * math.pi) * self._angle_error * self._period
+            first = self._angles
+        else:
+            reach, stiff, whole = 0.5 * self._angles[1], 0.0, 2.0 * math.pi * self._period
+            higher = self.orders**2 @ np.abs(product) * reach**2  # at most, between the trial angles
+            is_top = (gain >= np.roll(gain, 1)) & (gain > np.roll(gain, -1))
+            first = self._angles[is_top & (gain > gain.max() - _DEEP - higher)]
+        angles = first
         for _ in range(_NEWTON):
             turned = product[:, None] * np.exp(1j * np.outer(self.orders, angles))
-            slope = -2.0 * np.imag(self.orders @ turned)
-            bend = np.minimum(-2.0 * np.real(self.orders**2 @ turned), -np.finfo(float).tiny)
-            angles = angles - np.clip(slope / bend, -0.5 * step, 0.5 * step)
+            slope = -2.0 * np.imag(self.orders @ turned) - stiff * (angles - first)
+            bend = np.minimum(-2.0 * np.real(self.orders**2 @ turned) - stiff, -np.finfo(float).tiny)
+            angles = angles - np.clip(slope / bend, -reach, reach)
         turned = product[:, None] * np.exp(1j * np.outer(self.orders, angles))
-        bend = np.maximum(2.0 * np.real(self.orders**2 @ turned), 2.0 * math.pi / whole**2)
-        return 2.0 * np.real(turned.sum(axis=0)), np.sqrt(2.0 * math.pi / bend) / whole
+        bend = np.maximum(2.0 * np.real(self.orders**2 @ turned) + stiff, 2.0 * math.pi / whole**2)
+        top = 2.0 * np.real(turned.sum(axis=0)) - 0.5 * stiff * (angles - first) ** 2
+        return top, np.sqrt(2.0 * math.pi / bend) / whole
 
 
 def _over_forces(lines: Lines, variance: Floats, unknown: Unknown) -> float:

@@ -13,7 +13,7 @@ N, TURNS, NOISE = 32, 48, 0.3
 ANGLE = 2 * np.pi * np.arange(N * TURNS) / N
 
 
-def channels(waves, is_absolute=False):
+def channels(waves, angle_error=np.inf):
     names = ("vertical", "horizontal")
     return Channels(
         names=names,
@@ -25,7 +25,7 @@ def channels(waves, is_absolute=False):
         n=N,
         spin=100.0,
         highest_order=0.4 * N,
-        is_absolute=is_absolute,
+        angle_error=angle_error,
     )
 
 
@@ -43,7 +43,7 @@ def noisy(turned=0.0, seed=1):
     return motion(turned) + NOISE * np.random.default_rng(seed).standard_normal((2, ANGLE.size))
 
 
-def brute_force(comparison, seen, angles):
+def brute_force(comparison, seen, angles, weights=1.0):
     """The same by the residuals themselves, at every angle."""
     size = DISCREPANCIES[:, None, None, None]
     least = 0.03 * noisy().std(axis=1)[:, None]
@@ -52,20 +52,30 @@ def brute_force(comparison, seen, angles):
     model = seen.values * np.exp(1j * comparison.orders * angles[:, None, None])
     apart = np.abs(comparison.measured.values - model) ** 2 / variance + np.log(np.pi * variance)
     terms = -apart.sum(axis=(2, 3))
-    return logsumexp(terms) - np.log(terms.size)
+    return logsumexp(terms, b=weights) - np.log(terms.size)
 
 
-@pytest.mark.parametrize("is_absolute", [True, False])
-def test_the_likelihood_is_the_integral_over_angles_and_discrepancies(is_absolute):
-    lines = LineComparison(channels(noisy(), is_absolute), 2, [])
-    n_angle = 2 if is_absolute else 8000
-    angles = 4 * np.pi * np.arange(n_angle) / n_angle
+def test_the_likelihood_is_the_integral_over_angles_and_discrepancies():
+    lines = LineComparison(channels(noisy()), 2, [])
+    angles = 4 * np.pi * np.arange(8000) / 8000
     seen = lines.of(motion(half=0.38))
     assert log_likelihood(lines, seen) == pytest.approx(brute_force(lines, seen, angles), abs=0.02)
 
 
+@pytest.mark.parametrize("turned", [0.0, 0.03])
+@pytest.mark.parametrize("error", [0.001, 0.02])
+def test_an_angle_that_is_known_is_integrated_over_its_error(error, turned):
+    lines = LineComparison(channels(noisy(turned), error), 2, [])
+    apart = error * np.linspace(-6, 6, 2001)
+    angles = np.concatenate([apart, apart + 2 * np.pi])
+    weights = np.exp(-0.5 * (apart / error) ** 2) * 12 / np.sqrt(2 * np.pi)
+    seen = lines.of(motion(half=0.38))
+    known = brute_force(lines, seen, angles, np.tile(weights, 2))
+    assert log_likelihood(lines, seen) == pytest.approx(known, abs=0.02)
+
+
 def test_unknown_angles_do_not_matter_known_ones_by_whole_revolutions_alone():
-    free, fixed = (LineComparison(channels(noisy(), known), 2, []) for known in (False, True))
+    free, fixed = (LineComparison(channels(noisy(), error), 2, []) for error in (np.inf, 0.01))
     at = {turned: motion(turned) for turned in (0.0, 1.1, 2 * np.pi)}
     assert log_likelihood(free, free.of(at[1.1])) == pytest.approx(
         log_likelihood(free, free.of(at[0.0])), abs=1e-3
@@ -86,7 +96,7 @@ def test_noise_is_that_between_the_lines():
 def test_unknown_forces_are_integrated_over():
     """By Monte Carlo over forces, their phases and sizes."""
     waves = noisy()
-    lines = LineComparison(channels(waves, is_absolute=True), 1, [])
+    lines = LineComparison(channels(waves, 1e-6), 1, [])
     shapes = np.array([[1.0 + 0.5j], [0.3 - 1j]])
     unknown = Unknown(2.0, shapes, np.array([0.1, 0.4]))
     without = np.stack(

@@ -131,7 +131,7 @@ def test_a_speed_that_is_known_roughly_is_refined(tmp_path):
     problem = read_problem(measured, study)
     assert problem.channels.spin == pytest.approx(rubbing_machine.SPIN, rel=2e-5)  # a thousandth of a bin
     assert "repeats" in problem.comparison.about
-    assert not problem.channels.is_absolute
+    assert problem.channels.angle_error == np.inf
 
 
 @pytest.mark.parametrize(
