@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,6 +30,8 @@ _MOVED = "measured_"  # what probes at the node of a measured orbit are called
 _ANGLES = {"vertical": 0.0, "horizontal": 0.5 * math.pi}
 _POINTING = math.radians(1.0)  # by which the direction of a key-phasor is known
 _PLACED = 0.3  # of a sample, by which its pulses are placed (standard deviation)
+_ACROSS = 0.05  # least sine of the angle between two probes that see a motion
+_DEAD = 1e-9  # of the largest value: a signal that varies by less is constant
 _SLIP = 0.02  # by which a speed that is given may be wrong
 _HARMONICS = 4  # by which the true speed is found
 _TRIALS = 20  # a bin of the spectrum
@@ -57,6 +61,8 @@ class Channels:
     angle_error : float
         rad, standard deviation of the angle of the shaft, by which phases are those of a simulation; infinite
         where it is unknown.
+    left_out : tuple of str
+        Signals that are constant, as of a sensor that is dead.
     """
 
     names: tuple[str, ...]
@@ -69,17 +75,27 @@ class Channels:
     spin: float
     highest_order: float
     angle_error: float
+    left_out: tuple[str, ...] = ()
 
     @property
     def revolutions(self) -> int:
         """Of the record."""
         return int(self.waves.shape[1]) // self.n
 
-    @property
-    def orbit(self) -> tuple[int, int] | None:
-        """Positions of the vertical and the horizontal motion, where both were measured."""
-        if {"vertical", "horizontal"} <= set(self.names):
-            return self.names.index("vertical"), self.names.index("horizontal")
+    @cached_property
+    def orbit(self) -> Floats | None:
+        """Shares (2, n_channel) of signals in the vertical and horizontal motion that two of them see."""
+        own = {name: {"angle": angle, "quantity": "displacement"} for name, angle in _ANGLES.items()}
+        known = own | {PROBE + probe["name"]: probe for probe in self.probes}
+        looks = [(i, known[name]) for i, name in enumerate(self.simulated) if name in known]
+        for (i, one), (j, other) in combinations(looks, 2):
+            is_motion = one["quantity"] == other["quantity"] == "displacement"
+            is_one_place = all(one.get(key) == other.get(key) for key in ("node", "stator"))
+            if is_motion and is_one_place and abs(math.sin(other["angle"] - one["angle"])) > _ACROSS:
+                seen = [[math.cos(probe["angle"]), math.sin(probe["angle"])] for probe in (one, other)]
+                shares = np.zeros((2, len(self.names)))
+                shares[:, [i, j]] = np.linalg.inv(seen)
+                return shares
         return None
 
     def of_record(self, signals: Mapping[str, Floats]) -> Floats:
@@ -106,9 +122,12 @@ def channels_of(measured: xr.Dataset) -> Channels:
         raise InputError(f"{where}: data: several records at several speeds; identify from one of them")
     known = {PROBE + probe["name"]: probe for probe in measured.attrs["study"]["record"]["probe"]}
     derived = set(_ANGLES) if "probes" in measured.attrs else set()
-    names, simulated, probes = [], [], []
-    for name in (str(key) for key, values in measured.data_vars.items() if values.dims == ("sample",)):
+    names, simulated, probes, left_out = [], [], [], []
+    for name in (str(key) for key, of in measured.data_vars.items() if of.dims == ("sample",)):
         if name in derived or not is_signal(name):
+            continue
+        if np.ptp(values := measured[name].values) <= _DEAD * np.abs(values).max():
+            left_out.append(name)
             continue
         probe = known.get(name)
         if probe is not None and not {"node", "stator"} & set(probe):
@@ -120,6 +139,8 @@ def channels_of(measured: xr.Dataset) -> Channels:
         names.append(name)
         simulated.append(name if probe is None else PROBE + probe["name"])
         probes += [] if probe is None else [probe]
+    if not names:
+        raise InputError(f"{where}: all signals are constant; choose other columns")
     n = samples_per_revolution(measured["revolution"])
     revolutions = measured.sizes["sample"] // n
     if revolutions < _FEWEST:
@@ -145,6 +166,7 @@ def channels_of(measured: xr.Dataset) -> Channels:
         spin=spin,
         highest_order=seen,
         angle_error=angle_error,
+        left_out=tuple(left_out),
     )
 
 

@@ -164,6 +164,8 @@ def _observed(problem: Problem) -> xr.Dataset:
         found[f"spectrum_{name}"] = "order", amplitude[i], about
         found[f"noise_{name}"] = "order", noise[i], about
         found[name] = "sample", mean[i], about
+    if channels.orbit is not None:
+        found["orbit"] = ("direction", "sample"), channels.orbit @ mean, {"units": "m"}
     return xr.Dataset(found, {"order": comparison.orders})
 
 
@@ -182,4 +184,8 @@ def _predicted(found: Found, at: NDArray[np.intp]) -> xr.Dataset:
         data[f"spectrum_{name}"] = (*dims, "order"), np.stack(spectra)[None, :, i], about
         kept = np.stack([wave[i, : _SHOWN * channels.n] for wave in waves])
         data[name] = (*dims, "sample"), kept[None] - kept.mean(axis=1)[None, :, None], about
+    if channels.orbit is not None:
+        moved = np.stack([channels.orbit @ wave[:, : _SHOWN * channels.n] for wave in waves])
+        moved -= moved.mean(axis=2, keepdims=True)
+        data["orbit"] = ("chain", "draw", "direction", "sample"), moved[None], {"units": "m"}
     return xr.Dataset(data, _counted(picked.size) | {"order": problem.comparison.orders})

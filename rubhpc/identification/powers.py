@@ -65,9 +65,9 @@ class PowerComparison:
         rows = list(waves.astype(np.complex128))
         size = _SEGMENT * self._n
         if self._orbit is not None:
-            v, w = self._orbit
-            whirl = waves[v] + 1j * waves[w]
-            rows[v], rows[w] = whirl, np.conj(whirl)
+            whirl = np.array([1.0, 1j]) @ self._orbit @ waves
+            for i, row in zip(np.flatnonzero(self._orbit.any(axis=0)), (whirl, np.conj(whirl)), strict=True):
+                rows[i] = row
         starts = range(0, waves.shape[1] - size + 1, size // 2)
         pieces = np.stack([np.stack([row[start : start + size] for start in starts]) for row in rows])
         pieces = pieces - pieces.mean(axis=2, keepdims=True)

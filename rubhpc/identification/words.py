@@ -28,6 +28,7 @@ _OPEN = 0.8  # of the spread of a prior, from which on a posterior says nothing
 _TIED = 0.9  # rank correlation of two quantities that are known together only
 _BAD = 4.0  # mean square of residuals over their standard deviation that no model should have
 _INTERVAL = (0.025, 0.5, 0.975)
+_NONE = "no rub"  # name of the hypothesis
 _BEFORE = ", if both were equally likely before"
 
 
@@ -40,6 +41,9 @@ def in_words(found: Found, tree: xr.DataTree) -> Iterator[str]:
         f"measured: {signals}; {channels.revolutions} revolutions at "
         f"{typed_quantity(channels.spin, 'rad s-1')}; {problem.comparison.about}"
     )
+    yield from problem.note.splitlines()
+    for name in channels.left_out:
+        yield f"{name} is constant and left out"
     evidence = found.evidence
     yield "ln(evidence): " + ", ".join(
         f"{name} {value:.1f} +- {error:.1f}" for name, (value, error) in evidence.items()
@@ -78,7 +82,8 @@ def _verdict(evidence: dict[str, tuple[float, float]], rub: str) -> Iterator[str
         yield f"it is {sure}not a rub: {odds} against one{_BEFORE}"
     _, odds, sure = _odds(evidence, others[0], others[1])
     if odds:
-        yield f"it is {sure}{others[0]}: {odds} against {others[1]}"
+        what = "no other fault" if others[0] == _NONE else others[0]
+        yield f"it is {sure}{what}: {odds} against {others[1]}"
     else:
         yield f"the data do not distinguish {others[0]} from {others[1]}"
 

@@ -1,5 +1,7 @@
 """Likelihoods of motions: against integrals done another way, and what counts as a motion that repeats."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.special import logsumexp
@@ -134,3 +136,22 @@ def test_powers_of_a_chaotic_motion_need_no_phase():
     assert "no phases" in powers.about
     assert log_likelihood(powers, powers.of(same)) > log_likelihood(powers, powers.of(other)) + 5
     assert powers.misfit(powers.of(same)) < 3
+
+
+def test_two_probes_at_one_place_see_the_orbit():
+    looks = {"left": -45, "skew": 70}
+    probes = [
+        {"name": name, "node": 3, "angle": np.radians(angle), "quantity": "displacement"}
+        for name, angle in looks.items()
+    ]
+    v, w = motion()
+    seen = np.stack([v * np.cos(p["angle"]) + w * np.sin(p["angle"]) for p in probes])
+    names = ("probe_left", "probe_skew")
+    one = replace(channels(seen), names=names, simulated=names, probes=tuple(probes))
+    assert one.orbit @ one.waves == pytest.approx(np.stack([v, w]))
+    apart = replace(one, probes=(probes[0], probes[1] | {"node": 4}))
+    assert apart.orbit is None
+    plain = channels(motion())
+    assert PowerComparison(one, []).measured.values == pytest.approx(
+        PowerComparison(plain, []).measured.values, abs=1e-3
+    )
