@@ -61,8 +61,6 @@ class Channels:
     angle_error : float
         rad, standard deviation of the angle of the shaft, by which phases are those of a simulation; infinite
         where it is unknown.
-    left_out : tuple of str
-        Signals that are constant, as of a sensor that is dead.
     """
 
     names: tuple[str, ...]
@@ -75,7 +73,6 @@ class Channels:
     spin: float
     highest_order: float
     angle_error: float
-    left_out: tuple[str, ...] = ()
 
     @property
     def revolutions(self) -> int:
@@ -107,7 +104,7 @@ def channels_of(measured: xr.Dataset) -> Channels:
     """Return the channels of a measured dataset.
 
     Signals with the name of a stored one are that; those of a stator are of the first. Of two probes whose
-    orbit is derived the probes themselves are used.
+    orbit is derived the probes themselves are used. Signals that are constant are left out.
 
     Raises
     ------
@@ -122,13 +119,12 @@ def channels_of(measured: xr.Dataset) -> Channels:
         raise InputError(f"{where}: data: several records at several speeds; identify from one of them")
     known = {PROBE + probe["name"]: probe for probe in measured.attrs["study"]["record"]["probe"]}
     derived = set(_ANGLES) if "probes" in measured.attrs else set()
-    names, simulated, probes, left_out = [], [], [], []
+    names, simulated, probes = [], [], []
     for name in (str(key) for key, of in measured.data_vars.items() if of.dims == ("sample",)):
         if name in derived or not is_signal(name):
             continue
         if np.ptp(values := measured[name].values) <= _DEAD * np.abs(values).max():
-            left_out.append(name)
-            continue
+            continue  # a dead sensor
         probe = known.get(name)
         if probe is not None and not {"node", "stator"} & set(probe):
             fix = f"add node = 8 to [signal.{probe['name']}], or stator = 1"
@@ -166,7 +162,6 @@ def channels_of(measured: xr.Dataset) -> Channels:
         spin=spin,
         highest_order=seen,
         angle_error=angle_error,
-        left_out=tuple(left_out),
     )
 
 

@@ -42,8 +42,6 @@ def in_words(found: Found, tree: xr.DataTree) -> Iterator[str]:
         f"{typed_quantity(channels.spin, 'rad s-1')}; {problem.comparison.about}"
     )
     yield from problem.note.splitlines()
-    for name in channels.left_out:
-        yield f"{name} is constant and left out"
     evidence = found.evidence
     yield "ln(evidence): " + ", ".join(
         f"{name} {value:.1f} +- {error:.1f}" for name, (value, error) in evidence.items()

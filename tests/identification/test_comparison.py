@@ -126,6 +126,15 @@ def test_noise_alone_does_not_make_a_motion_chaotic_and_chaos_does():
     assert period_of_lines(channels(motion() + 0.05 * walk)) == 0
 
 
+def test_a_quasi_periodic_motion_repeats_in_no_number_of_revolutions():
+    turns = np.arange(N * 160) / N
+    whirl = np.exp(2j * np.pi * turns) + 0.3 * np.exp(2j * np.pi * turns * (15 / 26 + 0.003))
+    long = replace(channels(motion()), waves=np.stack([whirl.real, whirl.imag]))
+    assert period_of_lines(long) == 0
+    whirl += 0.3 * np.exp(2j * np.pi * turns * 15 / 26) - 0.3 * np.exp(2j * np.pi * turns * (15 / 26 + 0.003))
+    assert period_of_lines(replace(long, waves=np.stack([whirl.real, whirl.imag]))) == 26
+
+
 def test_powers_of_a_chaotic_motion_need_no_phase():
     rng = np.random.default_rng(5)
     drift = np.cumsum(0.3 * rng.standard_normal((2, ANGLE.size)), axis=1)
