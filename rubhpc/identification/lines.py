@@ -45,6 +45,7 @@ _NEIGHBOURS = 0.5  # orders to either side, whose lines give the noise
 _FINE = 12  # trial angles a turn of the highest order
 _DEEP = 25.0  # by how much less likely an angle is that is left out
 _NEWTON = 4
+_FLAT = 1e-9  # of the largest bend: a smaller one counts as this
 
 
 class LineComparison:
@@ -149,20 +150,22 @@ class LineComparison:
 
     def _peaks(self, product: Lines, gain: Floats) -> tuple[Floats, Floats]:
         """Maxima over the angle, and the share of all angles that each stands for (Laplace's method)."""
+        steepest = float(self.orders**2 @ np.abs(product))
+        flat = -max(_FLAT * steepest, np.finfo(float).tiny)
         if self._is_absolute:
             reach, stiff = self._angle_error, self._angle_error**-2
             whole = math.sqrt(2.0 * math.pi) * self._angle_error * self._period
             first = self._angles
         else:
             reach, stiff, whole = 0.5 * self._angles[1], 0.0, 2.0 * math.pi * self._period
-            higher = self.orders**2 @ np.abs(product) * reach**2  # at most, between the trial angles
+            higher = steepest * reach**2  # at most, between the trial angles
             is_top = (gain >= np.roll(gain, 1)) & (gain > np.roll(gain, -1))
             first = self._angles[is_top & (gain > gain.max() - _DEEP - higher)]
         angles = first
         for _ in range(_NEWTON):
             turned = product[:, None] * np.exp(1j * np.outer(self.orders, angles))
             slope = -2.0 * np.imag(self.orders @ turned) - stiff * (angles - first)
-            bend = np.minimum(-2.0 * np.real(self.orders**2 @ turned) - stiff, -np.finfo(float).tiny)
+            bend = np.minimum(-2.0 * np.real(self.orders**2 @ turned) - stiff, flat)
             angles = angles - np.clip(slope / bend, -reach, reach)
         turned = product[:, None] * np.exp(1j * np.outer(self.orders, angles))
         bend = np.maximum(2.0 * np.real(self.orders**2 @ turned) + stiff, 2.0 * math.pi / whole**2)
