@@ -161,6 +161,8 @@ class LineComparison:
             higher = steepest * reach**2  # at most, between the trial angles
             is_top = (gain >= np.roll(gain, 1)) & (gain > np.roll(gain, -1))
             first = self._angles[is_top & (gain > gain.max() - _DEEP - higher)]
+            if not first.size:  # a model that does not move
+                return gain[:1], np.ones(1)
         angles = first
         for _ in range(_NEWTON):
             turned = product[:, None] * np.exp(1j * np.outer(self.orders, angles))

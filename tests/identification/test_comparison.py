@@ -87,6 +87,13 @@ def test_unknown_angles_do_not_matter_known_ones_by_whole_revolutions_alone():
     assert other < one - 10.0
 
 
+def test_a_model_that_does_not_move_has_any_angle():
+    free, known = (LineComparison(channels(noisy(), error), 2, []) for error in (np.inf, 0.01))
+    still = free.of(np.zeros_like(motion()))
+    assert log_likelihood(free, still) == pytest.approx(log_likelihood(known, still))
+    assert free.misfit(still) == pytest.approx(known.misfit(still))
+
+
 def test_noise_is_that_between_the_lines():
     lines = LineComparison(channels(noisy()), 2, [])
     # Of white noise: 4 sigma^2 / n.
