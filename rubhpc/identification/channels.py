@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from postproc.signals.places import see_motion
 from postproc.signals.resampling import between
 from postproc.signals.spectra import samples_per_revolution
 from postproc.store.attributes import MEASURED
@@ -30,7 +31,6 @@ _MOVED = "measured_"  # what probes at the node of a measured orbit are called
 _ANGLES = {"vertical": 0.0, "horizontal": 0.5 * math.pi}
 _POINTING = math.radians(1.0)  # by which the direction of a key-phasor is known
 _PLACED = 0.3  # of a sample, by which its pulses are placed (standard deviation)
-_ACROSS = 0.05  # least sine of the angle between two probes that see a motion
 _DEAD = 1e-9  # of the largest value: a signal that varies by less is constant
 _SLIP = 0.02  # by which a speed that is given may be wrong
 _HARMONICS = 4  # by which the true speed is found
@@ -86,9 +86,7 @@ class Channels:
         known = own | {PROBE + probe["name"]: probe for probe in self.probes}
         looks = [(i, known[name]) for i, name in enumerate(self.simulated) if name in known]
         for (i, one), (j, other) in combinations(looks, 2):
-            is_motion = one["quantity"] == other["quantity"] == "displacement"
-            is_one_place = all(one.get(key) == other.get(key) for key in ("node", "stator"))
-            if is_motion and is_one_place and abs(math.sin(other["angle"] - one["angle"])) > _ACROSS:
+            if see_motion(one, other):
                 seen = [[math.cos(probe["angle"]), math.sin(probe["angle"])] for probe in (one, other)]
                 shares = np.zeros((2, len(self.names)))
                 shares[:, [i, j]] = np.linalg.inv(seen)
