@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 _QUEUE = 8
 _SPARSE = 30.0  # per cent of the points that are accepted, below which they are drawn within bounds
 _PRECISION = 0.1  # of ln(evidence) that is left when the sampling ends
+_MOST = 20_000  # evaluations: a rough likelihood, as of a machine that it is not, has no end of peaks
 
 
 class Sampled(NamedTuple):
@@ -38,6 +39,11 @@ class Sampled(NamedTuple):
     log_evidence: float
     error: float  # standard error of the logarithm
     n_call: int
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the sampling ended by itself."""
+        return self.n_call <= _MOST
 
     def draws(self, count: int, seed: int) -> NDArray[np.intp]:
         """Return the positions of so many equally likely draws."""
@@ -130,7 +136,7 @@ def sample(
             )
         except RuntimeError:
             raise InputError("identify: no case of the prior can be computed; narrow the priors") from None
-        sampler.run_nested(dlogz=_PRECISION, print_progress=True, print_func=report)
+        sampler.run_nested(dlogz=_PRECISION, maxcall=_MOST, print_progress=True, print_func=report)
     found = sampler.results
     before = np.concatenate([[0.0], found.logvol[:-1]])
     volumes = np.exp(before) - np.exp(found.logvol)

@@ -46,6 +46,10 @@ def in_words(found: Found, tree: xr.DataTree) -> Iterator[str]:
     yield "ln(evidence): " + ", ".join(
         f"{name} {value:.1f} +- {error:.1f}" for name, (value, error) in evidence.items()
     )
+    for one, sampled in ((problem.rub, found.rub), *found.others.items()):
+        if not sampled.is_whole:
+            fix = "it may explain more than was found; narrow the priors"
+            yield f"{one.name}: the sampling was ended after {sampled.n_call} cases; {fix}"
     best = max(evidence, key=lambda name: evidence[name][0])
     if problem.rub.name not in evidence:
         yield "no case of [grid] touches, so that a rub has not been tried; lower the clearance"
