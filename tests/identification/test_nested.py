@@ -43,7 +43,7 @@ def test_evidence_and_posterior_of_a_gaussian():
 
 
 def test_a_likelihood_without_end_is_left(monkeypatch):
-    monkeypatch.setattr(nested, "_MOST", 600)
+    monkeypatch.setattr(nested, "_MOST", 6)
     one = found(Alone(), lambda values: 1e3 * math.sin(1e6 * values.sum()))
     assert 600 < one.n_call < 2000
     assert not one.is_whole
