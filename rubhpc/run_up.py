@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.case_arguments import CaseArguments, case_of, read_probes
-from rubhpc.errors import InputError
+from rubhpc.errors import InputError, located
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.free_spin import release
-from rubhpc.input.fields import FieldError
 from rubhpc.input.quantity import parse_quantity
 from rubhpc.input.reading import build, plain
 from rubhpc.integrate.changing_speed.case import by_revolution
@@ -188,10 +187,9 @@ def run_up(
 
 def _read_drive(drive: Mapping[str, object]) -> DriveLaw:
     """The drive from the keys of its table."""
-    try:
-        return build(DriveKeys, drive, "run_up", "drive").law_at({})
-    except FieldError as error:
-        raise InputError(f"run_up: drive: {error}") from None
+    keys = build(DriveKeys, drive, "run_up", "drive")
+    with located("run_up: drive: "):
+        return keys.law_at({})
 
 
 def _highest(law: SpeedLaw | DriveLaw, rig: Rig | str | PathLike[str], overrides: Any) -> float:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rubhpc.errors import InputError
+from rubhpc.errors import InputError, located
 from rubhpc.fem.carrier import assemble_carrier
 from rubhpc.fem.model import MOST_DEGREES, Model, check_computable, computable
 from rubhpc.fem.rotor import assemble_rotor
@@ -98,10 +98,8 @@ def _set_about_the_shaft(
     stators: list[StatorModel], body: Body, load: NDArray[np.float64], spin: float
 ) -> list[StatorModel]:
     """Stators set about the centre of the shaft where it rests under its loads at a spin, rad/s."""
-    try:
+    with located("[rotor] clearance_from: "):
         turning = body.at(spin)
-    except InputError as error:
-        raise InputError(f"[rotor] clearance_from: {error}") from None
     sag, _ = at_rest_under(turning, load, spin)
     placed = []
     for stator in stators:

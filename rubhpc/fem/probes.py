@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.errors import InputError
+from rubhpc.errors import InputError, located
 from rubhpc.fem.beam import rayleigh_coefficients
 from rubhpc.fem.carrier import own_matrices
 from rubhpc.fem.model import ProbeRows
@@ -66,10 +66,8 @@ def with_probes(model: Model, rig: Rig, probes: Sequence[Probe], spin: float) ->
             here, there = model.rotor.index(node, name), model.rotor.index(far or 0, name)
             _add_force(rows[DISPLACEMENT, k], np.ones(1), [here], [there])
     for i, probe in enumerate(probes):
-        try:
+        with located(f"[record] probe {probe.name}: "):
             _fill(rows[:, i], probe, model, rig, spin)
-        except InputError as error:
-            raise InputError(f"[record] probe {probe.name}: {error}") from None
     constant = seen_at_rest(model, probes, rows[DISPLACEMENT])
     return replace(
         model,

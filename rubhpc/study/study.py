@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rubhpc.errors import InputError
+from rubhpc.errors import InputError, located
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.probes import with_probes
 from rubhpc.input.messages import brief, nearest, place, quoted
@@ -70,10 +70,8 @@ def table_of(table: dict[str, Any], key: str, file: str) -> dict[str, Any]:
 
 def overridden(rig: Rig, table: dict[str, Any], file: str) -> Rig:
     """The rig with the values of [override]."""
-    try:
+    with located(f"{place(file, 'override')} "):
         return with_keys(rig, dict(flatten(table)))
-    except InputError as error:
-        raise InputError(f"{place(file, 'override')} {error}") from None
 
 
 def read_branch(
@@ -123,10 +121,8 @@ def read_axes(
             (branch_axis if name == along else make_axis)(name, values, rig, file) for name, values in pairs
         )
     axes = [(make_range if isinstance(v, dict) else make_axis)(name, v, rig, file) for name, v in pairs]
-    try:
+    with located(f"{place(file)}: "):
         return draw(axes, sample, rig)
-    except InputError as error:
-        raise InputError(f"{place(file)}: {error}") from None
 
 
 # Names that a store takes for itself; an axis `clearance` is the very setting of that name.
@@ -184,13 +180,9 @@ def check_rigs(rig: Rig, axes: tuple[Axis, ...], probes: tuple[Probe, ...] = ())
         )
     for values in grid:
         case = dict(zip(names, values, strict=True))
-        try:
+        where = ", ".join(f"{name} = {value:g}" for name, value in case.items())
+        with located(f"[grid] {where}: invalid rig: " if case else ""):
             _check_rig(with_keys(rig, case), axes)
-        except InputError as error:
-            if not case:
-                raise
-            values_text = ", ".join(f"{name} = {value:g}" for name, value in case.items())
-            raise InputError(f"[grid] {values_text}: invalid rig: {error}") from None
     if probes:  # of the first rig, since each is assembled for it
         chosen = with_keys(rig, {axis.name: axis.tried[0] for axis in rig_axes})
         model = assemble(chosen)
@@ -381,10 +373,6 @@ class Study:
         }
 
 
-def _values(axis: Axis) -> list[str | float]:
-    return [*(axis.words or axis.values)]
-
-
 def read_study(
     path: str | PathLike[str], output: str | PathLike[str] | None = None, *, trust_rig: bool = False
 ) -> Study:
@@ -443,15 +431,13 @@ def study_of(
     run_up = build(RunUpKeys, table["run_up"], file, "run_up") if "run_up" in table else None
     drive = build(DriveKeys, table["drive"], file, "drive") if "drive" in table else None
     axes = read_axes(grid, rig, sample, file, branch.along if branch else "")
-    try:
+    with located(f"{place(file)}: "):
         if run_up is not None:
             refuse_speeds("run_up", [axis.name for axis in axes])
             axes = (*axes, speed_axis(run_up.highest, "highest spin speed"))
         elif drive is not None:
             refuse_speeds("drive", [axis.name for axis in axes])
             axes = (*axes, speed_axis(first_speed(drive, axes), "first spin speed"))
-    except InputError as error:
-        raise InputError(f"{place(file)}: {error}") from None
     for name in {axis.name for axis in axes} & dict(flatten(table.get("override", {}))).keys():
         raise InputError(f"{place(file, 'override', name)}: is also an axis of the grid; remove one")
     for name in ("contact", "initial"):
@@ -465,7 +451,7 @@ def study_of(
     integrator = build(Integrator, table.get("integrator", {}), file, "integrator")
     recording = build(Recording, table.get("record", {}), file, "record")
     run = build(Run, table.get("run", {}), file, "run")
-    try:
+    with located(f"{place(file)}: "):
         return Study(
             title=title,
             rig=rig,
@@ -483,5 +469,3 @@ def study_of(
             output=Path(store),
             source=source,
         )
-    except InputError as error:
-        raise InputError(f"{place(file)}: {error}") from None
