@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from rubhpc.commands.quantity import quantity
+from rubhpc.commands.options import quantity
 from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
@@ -155,12 +155,7 @@ def _ends(pair: tuple[str, str] | None, option: str) -> tuple[float, float] | No
 
 
 def _plain(mode: Mode) -> dict[str, Any]:
-    return {
-        "frequency": mode.frequency,
-        "damping_ratio": mode.damping_ratio,
-        "kind": mode.kind,
-        "whirl": mode.whirl,
-    }
+    return {key: getattr(mode, key) for key in ("frequency", "damping_ratio", "kind", "whirl")}
 
 
 def _print_tables(
