@@ -12,7 +12,6 @@ from rubhpc.errors import InputError, located
 from rubhpc.fem.beam import rayleigh_coefficients
 from rubhpc.fem.carrier import own_matrices
 from rubhpc.fem.model import ProbeRows
-from rubhpc.fem.statics import sag_at
 from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.rig.probes import MOTIONS, TWISTS
 from rubhpc.rig.rotors import Rotor
@@ -83,7 +82,7 @@ def seen_at_rest(model: Model, probes: Sequence[Probe], rows: Floats) -> Floats:
     for i, probe in enumerate(probes):
         if model.film is not None and probe.quantity == "bearing_force" and probe.node in journals:
             assert probe.node is not None
-            up, aside = sag_at(model.rotor, model.film, probe.node)
+            up, aside = model.rotor.at_node(probe.node, model.film)
             constant[i] -= math.cos(probe.angle) * up + math.sin(probe.angle) * aside
     return constant
 

@@ -19,6 +19,7 @@ import xarray as xr
 from scipy.optimize import brentq, minimize_scalar
 
 from rubhpc.fem.response import check_response_node, contact_free_amplitude, response_nodes, steady_response
+from rubhpc.schema import described
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -81,21 +82,17 @@ def unbalance_response(
     over = ("speed", "node")
     return xr.Dataset(
         {
-            "major_axis": (over, forward + backward, _unit("m", "Major semi-axis of the orbit")),
-            "minor_axis": (over, forward - backward, _unit("m", "Minor semi-axis of the orbit")),
-            "amplitude": ((*over, "probe"), np.abs(seen), _unit("m", "Amplitude at the probe")),
-            "phase": ((*over, "probe"), phase, _unit("rad", "Phase lead at the probe")),
+            "major_axis": (over, forward + backward, described("m", "Major semi-axis of the orbit")),
+            "minor_axis": (over, forward - backward, described("m", "Minor semi-axis of the orbit")),
+            "amplitude": ((*over, "probe"), np.abs(seen), described("m", "Amplitude at the probe")),
+            "phase": ((*over, "probe"), phase, described("rad", "Phase lead at the probe")),
         },
         coords={
-            "speed": ("speed", np.asarray(speeds, dtype=np.float64), _unit("rad s-1", "Spin speed")),
+            "speed": ("speed", np.asarray(speeds, dtype=np.float64), described("rad s-1", "Spin speed")),
             "node": ("node", nodes, {"long_name": "Node of the rotor"}),
-            "probe": ("probe", np.asarray(probes, dtype=np.float64), _unit("rad", "Angle of the probe")),
+            "probe": ("probe", np.asarray(probes, dtype=np.float64), described("rad", "Angle of the probe")),
         },
     )
-
-
-def _unit(units: str, name: str) -> dict[str, str]:
-    return {"units": units, "long_name": name}
 
 
 HALF_POWER = math.sqrt(0.5)
@@ -174,12 +171,11 @@ def amplitude_over_speed(model: Model, node: int, probe: float | None = None) ->
     """
     if probe is None:
         return lambda spin: contact_free_amplitude(model, spin, node)
-    rows = [model.rotor.index(node, name) for name in ("v", "w")]
-    parts = list(zip(rows, (math.cos(probe), math.sin(probe)), strict=True))
+    along, across = math.cos(probe), math.sin(probe)
 
     def amplitude(spin: float) -> float:
-        response = steady_response(model, spin)
-        return float(abs(sum(share * response[row] for row, share in parts if row >= 0)))
+        v, w = model.rotor.at_node(node, steady_response(model, spin))
+        return float(abs(along * v + across * w))
 
     return amplitude
 
