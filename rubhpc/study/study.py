@@ -74,15 +74,7 @@ def overridden(rig: Rig, table: dict[str, Any], file: str) -> Rig:
         return with_keys(rig, dict(flatten(table)))
 
 
-def read_branch(
-    table: dict[str, Any],
-    grid: dict[str, Any],
-    rig: Rig,
-    sample: Sample | None,
-    file: str,
-    *,
-    is_refined: bool,
-) -> BranchKeys:
+def read_branch(table: dict[str, Any], grid: dict[str, Any], rig: Rig, file: str) -> BranchKeys:
     """Return the table [branch], its step in the unit of its axis."""
     along, step = table.get("along"), table.get("step")
     axes = dict(flatten(grid))
@@ -90,11 +82,6 @@ def read_branch(
         meant = nearest(along, axes)
         fix = meant if meant.startswith("did") else "add it as { start, stop }"
         raise InputError(f"{place(file, 'branch', 'along')}: {along} is not an axis of the grid; {fix}")
-    if sample is not None:
-        fix = "a sample has no axis to follow; remove [sample] or [branch]"
-        raise InputError(f"{place(file, 'branch')}: {fix}")
-    if is_refined:
-        raise InputError(f"{place(file, 'branch')}: branches are not refined; remove [refine] or [branch]")
     if isinstance(along, str) and isinstance(step, str):
         where = place(file, "branch", "step")
         try:
@@ -306,13 +293,8 @@ class Study:
         contacts = check_contacts(self.contact, [axis for axis in self.axes if axis.is_contact_key])
         check_initials(self.initial, [axis for axis in self.axes if axis.is_initial_key])
         if self.branch is not None:
-            check_branch(
-                self.branch,
-                self.axes,
-                self.integrator,
-                self.recording,
-                is_sampled=self.sample is not None,
-            )
+            beside = [name for name in ("sample", "refine") if getattr(self, name) is not None]
+            check_branch(self.branch, self.axes, self.integrator, self.recording, beside)
         check_rigs(self.rig, self.axes, self.recording.probe)
         for contact in contacts:
             check_method(contact, self.integrator, is_bent=self.has_bent_stator, stators=self._freest_stators)
@@ -420,16 +402,11 @@ def study_of(
         line_of_text(table, "rig", "", file), source.parent, place(file, "", "rig"), trust_rig=trust_rig
     )
     rig = overridden(rig, table_of(table, "override", file), file)
-    sample = build(Sample, table["sample"], file, "sample") if "sample" in table else None
-    refine = build(Refine, table["refine"], file, "refine") if "refine" in table else None
+    kinds = {"sample": Sample, "refine": Refine, "run_up": RunUpKeys, "drive": DriveKeys}
+    given: Any = {name: build(kinds[name], table[name], file, name) for name in kinds if name in table}
+    sample, run_up, drive = given.get("sample"), given.get("run_up"), given.get("drive")
     grid = table_of(table, "grid", file)
-    branch = None
-    if "branch" in table:
-        branch = read_branch(
-            table_of(table, "branch", file), grid, rig, sample, file, is_refined=refine is not None
-        )
-    run_up = build(RunUpKeys, table["run_up"], file, "run_up") if "run_up" in table else None
-    drive = build(DriveKeys, table["drive"], file, "drive") if "drive" in table else None
+    branch = read_branch(table_of(table, "branch", file), grid, rig, file) if "branch" in table else None
     axes = read_axes(grid, rig, sample, file, branch.along if branch else "")
     with located(f"{place(file)}: "):
         if run_up is not None:
@@ -456,11 +433,8 @@ def study_of(
             title=title,
             rig=rig,
             axes=axes,
-            sample=sample,
-            refine=refine,
             branch=branch,
-            run_up=run_up,
-            drive=drive,
+            **given,
             contact=contact,
             initial=initial,
             integrator=integrator,

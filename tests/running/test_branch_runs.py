@@ -184,7 +184,7 @@ def test_multipliers_are_drawn(store):
             '[integrator]\nmethod = "central-difference"\n[record]',
             "branches need .integrator. method",
         ),
-        ("[record]", "[sample]\nn = 8\n[record]", "a sample has no axis to follow"),
+        ("[record]", "[sample]\nn = 8\n[record]", "has no axis to follow"),
         ("[0.74, 0.75]", '{ values = [0.74, 0.75], sweep = "up" }', "branches need no sweep"),
         ("[record]", "[record]\nlyapunov = 2", "lyapunov: branches have multipliers in its place"),
     ],

@@ -321,7 +321,7 @@ def test_status_and_plan_show_the_parts(physics, tmp_path, monkeypatch):
     monkeypatch.setattr(Sample, "set_up", 0.0)
     plans = [make_plan(study, f"{number}/4") for number in range(1, 5)]
     assert [plan.counts[MISSING] == 0 for plan in plans] == [False, True, False, False]
-    assert sum(plan.core_hours for plan in plans) == pytest.approx(make_plan(study).core_hours)
+    assert sum(plan.time.seconds for plan in plans) == pytest.approx(make_plan(study).time.seconds)
     assert "part        2/4: " in plans[1].text()
 
 
