@@ -186,10 +186,10 @@ class Body:
         found: NDArray[np.complex128] = self.stiffness - rate**2 * self.mass + 1j * rate * damping
         return found
 
-    def at_node(self, node: int, values: NDArray[Any], names: Sequence[str] = ("v", "w")) -> list[Any]:
+    def at_node(self, node: int, values: NDArray[Any], names: Sequence[str] = ("v", "w")) -> tuple[Any, ...]:
         """Values (n_dof,) at degrees of a node, by default up and horizontally; 0 where there is none."""
         rows = (self.index(node, name) for name in names)
-        return [values[row] if row >= 0 else 0.0 for row in rows]
+        return tuple(values[row] if row >= 0 else 0.0 for row in rows)
 
     def index(self, node: int, name: str) -> int:
         """Row of a degree of freedom; -1 where it is constrained or absent."""
