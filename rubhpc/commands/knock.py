@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import time
+from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from rubhpc.commands.options import STUDY, TRUST_STUDY, WORKERS, quantity
-from rubhpc.errors import InputError
 from rubhpc.running.launch import launch
 
 if TYPE_CHECKING:
@@ -56,9 +56,9 @@ def knock(
     from postproc.figures.resilience_curve import resilience
     from postproc.store.export import check_data_path, write_data
     from rubhpc.knock_cases import Progress
-    from rubhpc.knocks import least_knock
-    from rubhpc.running.knocks_on_ranks import least_knock_on
+    from rubhpc.running.knocks_on_ranks import least_knock_on, take_part
     from rubhpc.running.pool import connect
+    from rubhpc.running.workers import start_workers
     from rubhpc.study.study import read_study
 
     path = check_figure_path(figure or f"{study.stem}_knock.png")
@@ -66,12 +66,8 @@ def knock(
     data_path = check_data_path(data) if data else None
     largest = None if most is None else quantity(most, "N*s", "--most")
     search |= {"most": largest, "progress": progress, "report": _report()}
-    if launch().size > 1:
-        if workers > 1:
-            raise InputError("--workers: mpirun has started several processes already; use one of the two")
-        found = least_knock_on(connect(), lambda: read_study(study, trust_rig=trust_rig), **search)
-    else:
-        found = least_knock(read_study(study, trust_rig=trust_rig), workers=workers, **search)
+    with nullcontext(connect()) if workers == 1 else start_workers(workers, take_part) as pool:
+        found = least_knock_on(pool, lambda: read_study(study, trust_rig=trust_rig), **search)
     if launch().rank > 0:
         return 0
     drawing = resilience(found)
