@@ -219,6 +219,7 @@ class FlightModes:
             bend=np.abs(moving * self.exponent),
             compliance=self.local @ self.local.T,
             kind=np.full(q, ROUND if setup.is_updated else FIXED),
+            is_straight=not setup.is_updated and self.n_local == BENDING,
             radius=radius,
             clearance=np.zeros(q),
             aside=self.sense * sag_at_stators(setup.model)[1],

@@ -582,7 +582,7 @@ def advance_by_collocation(
                     case.force,
                     solution.guess,
                     is_continued,
-                    solution.noise[slot],
+                    solution.noise[solution.used[0]],
                     solution,
                 )
                 error *= min(1.0, step / AVERAGED)
@@ -624,7 +624,7 @@ def advance_by_collocation(
                 if is_recorded:
                     if not signals.is_filled[slot]:
                         fill_signals(bodies, nodes, tables, signals, slot)
-                    n_closed = list_closed(bodies, nodes, state, solution)[0]
+                    n_closed = list_closed(bodies, nodes, state, False, solution)[0]
                     record_step(
                         bodies,
                         nodes,

@@ -1,7 +1,8 @@
 """A step of closed contacts: forces that obey the laws at the nodes, by Newton's method.
 
 Unknown are the forces of the closed pairs at the nodes, N and, unless friction is a constant multiple of it,
-T; and the local displacements at the nodes after the first, by which the loads turn. The equations are
+T. The loads turn with the local displacements at the nodes: these are those of the iteration before, or,
+where Newton's method needs exact slopes, unknown too (`has_place`). The equations are
 
 - hard contact: `gap = faded error` at the nodes after the first, and the rate of it at the end;
 - springs: `N = law(gap, rate)` at the nodes after the first, and its rate at the end;
@@ -113,7 +114,9 @@ def n_force(bodies: Bodies, state: int) -> int:
 
 
 @linked_sum
-def list_closed(bodies: Bodies, nodes: Nodes, state: Ints, solution: Solution) -> tuple[int, int, int]:
+def list_closed(
+    bodies: Bodies, nodes: Nodes, state: Ints, has_place: bool, solution: Solution
+) -> tuple[int, int, int]:
     """Number of closed pairs, which are listed, and of unknown forces and of all unknowns."""
     s, n_closed, n_unknown = nodes.at.size, 0, 0
     for i in range(state.size):
@@ -121,7 +124,8 @@ def list_closed(bodies: Bodies, nodes: Nodes, state: Ints, solution: Solution) -
             solution.closed[n_closed] = i
             n_closed += 1
             n_unknown += s * n_force(bodies, state[i])
-    return n_closed, n_unknown, n_unknown + n_closed * (s - 1) * (bodies.n_local - 1)
+    n_place = n_closed * (s - 1) * (bodies.n_local - 1) if has_place else 0
+    return n_closed, n_unknown, n_unknown + n_place
 
 
 @linked_sum
@@ -240,6 +244,7 @@ def fill_residual(
     force: Floats,
     n_closed: int,
     is_lean: bool,
+    has_place: bool,
     solution: Solution,
 ) -> None:
     """Fill the residuals of all equations."""
@@ -281,7 +286,7 @@ def fill_residual(
             for k in range(s):
                 residual[row + k] = t[k] - state[i] * friction_ratio(bodies, i, seen[k, SLIP])[0] * n[k]
             row += s
-    for c in range(n_closed):
+    for c in range(n_closed if has_place else 0):
         first_row = solution.closed[c] * n_local
         for k in range(1, s):
             for a in range(n_local):
@@ -498,20 +503,26 @@ def fill_column(
     state: Ints,
     force: Floats,
     n_closed: int,
+    has_place: bool,
     col: int,
-    n: int,
     solution: Solution,
 ) -> None:
     """Fill a column of the matrix by the changes `change`, `moved` and `pushed` of one unknown."""
     s, n_local, n_row = nodes.at.size, bodies.n_local, bodies.load.shape[0]
     target, row = solution.residual, 0
+    if not has_place:
+        for c in range(n_closed):
+            first = solution.closed[c] * n_local
+            for k in range(1, s):
+                for a in range(first, first + n_local):
+                    solution.moved[k, a] = solution.change[(k - 1) * n_row + a]
     for c in range(n_closed):
         i = solution.closed[c]
         change_pair(bodies, nodes, i, 1, solution.begun, solution.change, solution.moved, solution)
         row = change_residual(
             bodies, nodes, tables, slot, state, force, i, solution.pushed[i], row, target, solution
         )
-    for c in range(n_closed):
+    for c in range(n_closed if has_place else 0):
         first = solution.closed[c] * n_local
         for k in range(1, s):
             for a in range(n_local):
@@ -519,8 +530,8 @@ def fill_column(
                     at = first + a
                     target[row] = solution.moved[k, at] - solution.change[(k - 1) * n_row + at]
                     row += 1
-    matrix = solution.matrix[slot]
-    for r in range(n):
+    matrix = solution.matrix[solution.used[0]]
+    for r in range(row):
         matrix[r, col] = target[r]
 
 
@@ -533,8 +544,8 @@ def fill_matrix(
     state: Ints,
     force: Floats,
     n_closed: int,
-    n: int,
     n_used: int,
+    has_place: bool,
     solution: Solution,
 ) -> bool:
     """Make the matrix of the equations, and its factors; False where it is singular."""
@@ -568,10 +579,10 @@ def fill_matrix(
                     for r in range(n_used):
                         change[r] += size * rows[r]
                 pushed[i, f, k] = 1.0
-                fill_column(bodies, nodes, tables, slot, state, force, n_closed, col, n, solution)
+                fill_column(bodies, nodes, tables, slot, state, force, n_closed, has_place, col, solution)
                 pushed[i, f, k] = 0.0
                 col += 1
-    for c in range(n_closed):
+    for c in range(n_closed if has_place else 0):
         i = solution.closed[c]
         for k in range(1, s):
             for b in range(n_local):
@@ -585,17 +596,16 @@ def fill_matrix(
                         for r in range(n_used):
                             change[r] += size * rows[r]
                 moved[k, i * n_local + b] = 1.0
-                fill_column(bodies, nodes, tables, slot, state, force, n_closed, col, n, solution)
+                fill_column(bodies, nodes, tables, slot, state, force, n_closed, has_place, col, solution)
                 moved[k, i * n_local + b] = 0.0
                 col += 1
-    return factorise(solution.matrix[slot], solution.pivot[slot], n)
+    return factorise(solution.matrix[solution.used[0]], solution.pivot[solution.used[0]], col)
 
 
 @linked_sum
 def noise_of(
     bodies: Bodies,
     nodes: Nodes,
-    slot: int,
     state: Ints,
     n_closed: int,
     n_pushed: int,
@@ -616,7 +626,7 @@ def noise_of(
                 for k in range(s):
                     residual[row + k] = ROUNDING * size * (1.0 if k % 2 == 0 else -1.0)
             row += s
-    solve_factorised(solution.matrix[slot], solution.pivot[slot], n, residual)
+    solve_factorised(solution.matrix[solution.used[0]], solution.pivot[solution.used[0]], n, residual)
     noise = 0.0
     for r in range(n_pushed):
         noise = max(noise, abs(residual[r]))
@@ -630,6 +640,42 @@ def code_of(state: Ints) -> int:
     for i in range(state.size):
         code = code * 7 + state[i] + 2
     return code
+
+
+@linked_sum
+def use_matrix(bodies: Bodies, tables: Tables, slot: int, state: Ints, has_place: bool, solution: Solution) -> int:
+    """Point at the matrix of a length of step and of states, with which it is made unless it was so before.
+
+    Of straight gaps several are kept for each length of step: they do not change with the motion.
+    """
+    code = 2 * code_of(state) + (1 if has_place else 0)
+    n_way = solution.states.size // tables.is_filled.size
+    way = code // 2 % n_way if bodies.is_straight else 0
+    used = slot * n_way + way
+    if solution.states[used] != code:
+        solution.states[used] = 0
+    solution.used[0] = used
+    return code
+
+
+@linked_sum
+def see_gaps(bodies: Bodies, nodes: Nodes, n_closed: int, solution: Solution) -> None:
+    """See the gaps of the closed pairs at the displacements of the nodes after the first."""
+    for c in range(n_closed):
+        i = solution.closed[c]
+        for k in range(1, nodes.at.size):
+            see_gap(bodies, i, solution.place[k], i * bodies.n_local, i * nodes.at.size + k, solution)
+
+
+@linked_sum
+def follow_loads(bodies: Bodies, nodes: Nodes, n_closed: int, solution: Solution) -> None:
+    """Take the displacements of the closed pairs at the nodes from y."""
+    n_local, n_row = bodies.n_local, bodies.load.shape[0]
+    for c in range(n_closed):
+        first = solution.closed[c] * n_local
+        for k in range(1, nodes.at.size):
+            for a in range(first, first + n_local):
+                solution.place[k, a] = solution.y[(k - 1) * n_row + a]
 
 
 @linked_sum
@@ -653,24 +699,19 @@ def take_step(
     is that at the solution, for the tangent.
     """
     s, n_local, n_row = nodes.at.size, bodies.n_local, bodies.load.shape[0]
-    n_y = (2 * s - 1) * n_row
-    n_closed, n_pushed, n = list_closed(bodies, nodes, state, solution)
-    place, y = solution.place, solution.y
-    matrix, pivot, residual, load = (
-        solution.matrix[slot],
-        solution.pivot[slot],
-        solution.residual,
-        solution.load,
-    )
-    is_lean = not bodies.is_varied
+    n_y, first_row = (2 * s - 1) * n_row, int(np.int64(0))
+    has_place = is_exact and not bodies.is_straight
+    n_closed, n_pushed, n = list_closed(bodies, nodes, state, has_place, solution)
+    place, residual, load, states = solution.place, solution.residual, solution.load, solution.states
+    is_lean, is_linear = not bodies.is_varied, bodies.is_straight and not bodies.is_varied
     for c in range(n_closed):
-        is_lean = is_lean and bodies.normal_law[solution.closed[c]] == LAGRANGE
+        law = bodies.normal_law[solution.closed[c]]
+        is_lean, is_linear = is_lean and law == LAGRANGE, is_linear and law != HERTZ
     n_used = s * n_row if is_lean else n_y
-    code = code_of(state)
-    if solution.states[slot] != code:
-        solution.states[slot] = 0
+    code = use_matrix(bodies, tables, slot, state, has_place, solution)
+    used = solution.used[0]
     see_motions(bodies, x, 2 * n_row, solution)
-    move_freely(tables.free[slot], x, int(np.int64(0)), n_used, solution)
+    move_freely(tables.free[slot], x, first_row, n_used, solution)
     for a in range(load.size):
         load[a] = 0.0
     for r in range(n_row):
@@ -680,21 +721,19 @@ def take_step(
         for k in range(s):
             see_gap(bodies, i, place[0], i * n_local, i * s + k, solution)
     push_closed(bodies, nodes, state, force, n_closed, solution)
-    respond(tables, slot, n_row, n_local, n_closed, int(np.int64(0)), n_used, solution)
-    for c in range(n_closed):
-        first = solution.closed[c] * n_local
-        for k in range(1, s):
-            for a in range(first, first + n_local):
-                place[k, a] = y[(k - 1) * n_row + a]
-    last, largest, iteration, is_solved, is_fresh = np.inf, 0.0, 0, False, False
+    respond(tables, slot, n_row, n_local, n_closed, first_row, n_used, solution)
+    follow_loads(bodies, nodes, n_closed, solution)
+    last, largest, iteration, n_made, is_solved, is_fresh = np.inf, 0.0, 0, 0, False, False
     while iteration < MOST_ITERATIONS:
         iteration += 1
-        for c in range(n_closed):
-            i = solution.closed[c]
-            for k in range(1, s):
-                see_gap(bodies, i, place[k], i * n_local, i * s + k, solution)
-        push_closed(bodies, nodes, state, force, n_closed, solution)
-        respond(tables, slot, n_row, n_local, n_closed, int(np.int64(0)), n_used, solution)
+        if has_place:
+            see_gaps(bodies, nodes, n_closed, solution)
+        if has_place or iteration > 1:
+            push_closed(bodies, nodes, state, force, n_closed, solution)
+            respond(tables, slot, n_row, n_local, n_closed, first_row, n_used, solution)
+        if not has_place:
+            follow_loads(bodies, nodes, n_closed, solution)
+            see_gaps(bodies, nodes, n_closed, solution)
         if is_solved:
             if is_whole and is_lean:
                 move_freely(tables.free[slot], x, n_used, n_y, solution)
@@ -703,22 +742,32 @@ def take_step(
                 see_pair(bodies, nodes, solution.closed[c], is_lean and not is_whole, solution)
             if not is_exact:
                 return iteration
-        fill_residual(bodies, nodes, tables, slot, state, force, n_closed, is_lean, solution)
-        if solution.states[slot] == 0 or is_solved:
-            if not fill_matrix(bodies, nodes, tables, slot, state, force, n_closed, n, n_used, solution):
-                solution.states[slot] = 0
+            if is_linear:
+                fill_slopes(bodies, nodes, state, force, n_closed, solution)
+                return iteration
+        fill_residual(
+            bodies, nodes, tables, slot, state, force, n_closed, is_lean, has_place, solution
+        )
+        if states[used] == 0 or is_solved:
+            states[used] = 0
+            n_made += 1
+            if not fill_matrix(
+                bodies, nodes, tables, slot, state, force, n_closed, n_used, has_place, solution
+            ):
                 return -iteration
-            solution.states[slot], is_fresh = code, True
-            solution.noise[slot] = noise_of(bodies, nodes, slot, state, n_closed, n_pushed, n, solution)
+            states[used], is_fresh = code, True
+            solution.noise[used] = noise_of(bodies, nodes, state, n_closed, n_pushed, n, solution)
             if is_solved:
                 return iteration
-            fill_residual(bodies, nodes, tables, slot, state, force, n_closed, is_lean, solution)
-        solve_factorised(matrix, pivot, n, residual)
+            fill_residual(
+                bodies, nodes, tables, slot, state, force, n_closed, is_lean, has_place, solution
+            )
+        solve_factorised(solution.matrix[used], solution.pivot[used], n, residual)
         change, largest, row = 0.0, 0.0, 0
         for r in range(n_pushed):
             change = max(change, abs(residual[r]))
         if not change < 1e200:
-            solution.states[slot] = 0
+            states[used] = 0
             return -iteration
         for c in range(n_closed):
             i = solution.closed[c]
@@ -728,20 +777,24 @@ def take_step(
                     if f == NORMAL:
                         largest = max(largest, abs(force[i, f, k]))
                 row += s
-        for c in range(n_closed):
+        for c in range(n_closed if has_place else 0):
             first = solution.closed[c] * n_local
             for k in range(1, s):
                 for a in range(n_local):
                     if a != TWIST:
                         place[k, first + a] -= residual[row]
                         row += 1
-        floor = max(tolerance, solution.noise[slot])
-        if change <= floor or (iteration > 1 and change * min(1.0, change / last) <= tolerance):
+        floor = max(tolerance, solution.noise[used])
+        if is_linear or change <= floor or (iteration > 1 and change * min(1.0, change / last) <= tolerance):
             is_solved = True
         elif iteration > 3 and change > 0.1 * last and (change < 1e-7 * largest or change < 30.0 * floor):
             is_solved = True  # rounding: no further progress
         elif iteration > 1 and change > SLOW * last and (not is_fresh or iteration > 2):
-            solution.states[slot] = 0
+            states[used] = 0
+            if n_made > 0 and not has_place:  # not the matrix, but the turning loads make it slow
+                has_place = True
+                n_closed, n_pushed, n = list_closed(bodies, nodes, state, has_place, solution)
+                code = use_matrix(bodies, tables, slot, state, has_place, solution)
         last, is_fresh = change, False
-    solution.states[slot] = 0
+    states[used] = 0
     return -iteration

@@ -54,6 +54,7 @@ class Bodies(Struct):
     bend: Floats  # (R, nm), bound on the acceleration of a local motion by a unit mode, 1/s2
     compliance: Floats  # (R, R), acceleration of a local motion by a unit load, 1/kg
     kind: Ints  # (q,), FIXED or ROUND
+    is_straight: bool  # all gaps are linear in the local motions
     radius: Floats  # (q,), of the rim, m; of a bore its clearance, negative
     clearance: Floats  # (q,), along the axis at rest, m
     aside: Floats  # (q,), of the tip at rest from the axis through the disc, m
@@ -118,10 +119,11 @@ class Solution(Struct):
     direction: Floats  # (s q, 2, n_local), of unknown forces
     residual: Floats  # (n,)
     closed: Ints  # (q,), the closed pairs
-    matrix: Floats  # (k, n, n), factors
-    pivot: Ints  # (k, n)
-    states: Ints  # (k,), states of the pairs with which a matrix was made, as one number; 0: none
-    noise: Floats  # (k,), force that the rounding of displacements causes, N
+    matrix: Floats  # (k m, n, n), factors: m of each length of step
+    pivot: Ints  # (k m, n)
+    states: Ints  # (k m,), states of the pairs with which a matrix was made, as one number; 0: none
+    noise: Floats  # (k m,), force that the rounding of displacements causes, N
+    used: Ints  # (1,), matrix of the last step
     change: Floats  # (ny,), of y
     moved: Floats  # (s, R), of `place`
     begun: Floats  # (3 R,), of `start`

@@ -105,7 +105,8 @@ def carry_step(
 ) -> None:
     """Carry the columns through a part of a step whose matrix is that at its solution."""
     s, n_local, n_row = nodes.at.size, bodies.n_local, bodies.load.shape[0]
-    n_closed, _, n = list_closed(bodies, nodes, state, solution)
+    has_place = not bodies.is_straight
+    n_closed, _, n = list_closed(bodies, nodes, state, has_place, solution)
     step, n_x = tables.tick * 2.0 ** (tables.first_level + slot), trail.column.size
     change, moved, begun, pushed = solution.change, solution.moved, solution.begun, solution.pushed
     column, load, target = trail.column, trail.load, solution.residual
@@ -128,13 +129,17 @@ def carry_step(
             change[r] = total
         for k in range(s):
             for r in range(n_row):
-                moved[k, r] = begun[r] if k == 0 else 0.0
+                moved[k, r] = 0.0
+                if k == 0:
+                    moved[k, r] = begun[r]
+                elif not has_place:
+                    moved[k, r] = change[(k - 1) * n_row + r]
         for r in range(load.size):
             load[r] = 0.0
         for p in range(n_closed):  # loads turn with the motion at the first node
             i = solution.closed[p]
             first = i * n_local
-            for a in range(n_local):
+            for a in range(n_local if has_place else 0):
                 total = 0.0
                 for b in range(n_local):
                     total += solution.turning[i * s, a, b] * begun[first + b]
@@ -148,14 +153,14 @@ def carry_step(
             row = change_residual(
                 bodies, nodes, tables, slot, state, force, i, pushed[i], row, target, solution
             )
-        for p in range(n_closed):
+        for p in range(n_closed if has_place else 0):
             first = solution.closed[p] * n_local
             for k in range(1, s):
                 for a in range(n_local):
                     if a != TWIST:
                         target[row] = -change[(k - 1) * n_row + first + a]
                         row += 1
-        solve_factorised(solution.matrix[slot], solution.pivot[slot], n, target)
+        solve_factorised(solution.matrix[solution.used[0]], solution.pivot[solution.used[0]], n, target)
         row = 0
         for p in range(n_closed):
             i = solution.closed[p]
@@ -165,7 +170,7 @@ def carry_step(
                         at = k * n_row + i * n_local + a
                         load[at] -= solution.direction[i * s + k, f, a] * target[row]
                     row += 1
-        for p in range(n_closed):
+        for p in range(n_closed if has_place else 0):
             i = solution.closed[p]
             for k in range(1, s):
                 for b in range(n_local):
@@ -379,6 +384,8 @@ def note_event(
     """Note an event, unless there is no room; a force that begins has not turned yet."""
     if before == OPEN:
         trail.swing[HIGH, pair] = -np.inf
+    if trail.tick.size == 0:
+        return  # none is asked for
     k = trail.count[N_EVENT]
     if k == trail.tick.size:
         trail.count[FULL] = 1
