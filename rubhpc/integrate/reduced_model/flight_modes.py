@@ -218,6 +218,7 @@ class FlightModes:
             kick=np.ascontiguousarray(kick),
             bend=np.abs(moving * self.exponent),
             compliance=self.local @ self.local.T,
+            reach=np.abs(moving) @ np.abs(self.kicks).T,
             kind=np.full(q, ROUND if setup.is_updated else FIXED),
             is_straight=not setup.is_updated and self.n_local == BENDING,
             radius=radius,

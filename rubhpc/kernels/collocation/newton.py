@@ -13,6 +13,8 @@ where Newton's method needs exact slopes, unknown too (`has_place`). The equatio
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -164,38 +166,123 @@ def push_closed(
 
 
 @linked_sum
-def move_freely(rows: Floats, x: Floats, begin: int, end: int, solution: Solution) -> None:
-    """Rows of y from one to another without loads."""
-    y_free = solution.y_free
-    for r in range(begin, end):
-        row, total = rows[r], 0.0
-        for k in range(x.size):
-            total += row[k] * x[k]
-        y_free[r] = total
+def move_freely(
+    bodies: Bodies,
+    rows: Floats,
+    x: Floats,
+    blocks: tuple[int, int],
+    pairs: tuple[int, int],
+    y: Floats,
+    solution: Solution,
+) -> None:
+    """Motions y of listed pairs without loads, in blocks of y: displacements at the nodes, and so on."""
+    n_local, n_row = bodies.n_local, bodies.load.shape[0]
+    for block in range(blocks[0], blocks[1]):
+        for p in range(pairs[0], pairs[1]):
+            first = block * n_row + solution.closed[p] * n_local
+            for r in range(first, first + n_local):
+                row, total = rows[r], 0.0
+                for k in range(x.size):
+                    total += row[k] * x[k]
+                y[r] = total
+
+
+@linked_sum
+def add_response(
+    bodies: Bodies,
+    size: float,
+    row: Floats,
+    blocks: tuple[int, int],
+    pairs: tuple[int, int],
+    y: Floats,
+    solution: Solution,
+) -> None:
+    """Add the response to a load, its `size` times a row of `Tables.forced`, to blocks of y of listed pairs."""
+    n_local, n_row, closed = bodies.n_local, bodies.load.shape[0], solution.closed
+    begin, end = blocks[0] * n_row, blocks[1] * n_row
+    if pairs[1] - pairs[0] == closed.size:
+        for r in range(begin, end):
+            y[r] += size * row[r]
+        return
+    for block in range(begin, end, n_row):
+        for p in range(pairs[0], pairs[1]):
+            first = block + closed[p] * n_local
+            for r in range(first, first + n_local):
+                y[r] += size * row[r]
 
 
 @linked_sum
 def respond(
-    tables: Tables,
-    slot: int,
-    n_row: int,
-    n_local: int,
+    bodies: Bodies,
+    forced: Floats,
     n_closed: int,
-    begin: int,
-    end: int,
+    blocks: tuple[int, int],
+    pairs: tuple[int, int],
+    load: Floats,
+    y_free: Floats,
+    y: Floats,
     solution: Solution,
 ) -> None:
-    """Rows of y from one to another under the loads of the closed pairs."""
-    y, y_free, forced, load = solution.y, solution.y_free, tables.forced[slot], solution.load
-    for r in range(begin, end):
-        y[r] = y_free[r]
-    for k in range(load.size // n_row):
+    """Motions y of listed pairs under the loads of the closed ones, in blocks of y."""
+    n_local, n_row, closed = bodies.n_local, bodies.load.shape[0], solution.closed
+    for block in range(blocks[0] * n_row, blocks[1] * n_row, n_row):
+        for p in range(pairs[0], pairs[1]):
+            first = block + closed[p] * n_local
+            for r in range(first, first + n_local):
+                y[r] = y_free[r]
+    for node in range(0, load.size, n_row):
         for c in range(n_closed):
-            first = k * n_row + solution.closed[c] * n_local
-            for a in range(first, first + n_local):
-                f, row = load[a], forced[a]
-                for r in range(begin, end):
-                    y[r] += f * row[r]
+            begun = node + closed[c] * n_local
+            for a in range(begun, begun + n_local):
+                add_response(bodies, load[a], forced[a], blocks, pairs, y, solution)
+
+
+@linked_sum
+def list_near(
+    bodies: Bodies, nodes: Nodes, step: float, x: Floats, state: Ints, n_closed: int, solution: Solution
+) -> int:
+    """List the open pairs that may touch within a step, after the closed ones; returns the number of all.
+
+    Bounds of the accelerations are those of a flight, and for each load its size and how much it changes in
+    the step times the sum of what the modes respond.
+    """
+    s, n_local, n_row, n = nodes.at.size, bodies.n_local, bodies.load.shape[0], n_closed
+    if n_closed == state.size:
+        return n
+    size, n_complex, start, load = solution.size, bodies.n_complex, solution.start, solution.load
+    for k in range(n_complex):
+        size[k] = math.sqrt(x[k] * x[k] + x[n_complex + k] * x[n_complex + k])
+    for k in range(n_complex, size.size):
+        size[k] = abs(x[n_complex + k])
+    for c in range(n_closed):
+        first = solution.closed[c] * n_local
+        for a in range(first, first + n_local):
+            total = abs(load[a])
+            for k in range(1, s):
+                total += abs(load[k * n_row + a] - load[(k - 1) * n_row + a])
+            solution.begun[a] = total
+    for i in range(state.size):
+        if state[i] != OPEN:
+            continue
+        first, rate, bound = i * n_local, 0.0, 0.0
+        see_gap(bodies, i, start, first, i * s, solution)
+        for a in range(n_local):
+            slope, total = solution.normal[i * s, a], 0.0
+            if slope != 0.0:
+                bend, reach = bodies.bend[first + a], bodies.reach[first + a]
+                for k in range(size.size):
+                    total += bend[k] * size[k]
+                for c in range(n_closed):
+                    begun = solution.closed[c] * n_local
+                    for b in range(begun, begun + n_local):
+                        total += reach[b] * solution.begun[b]
+                rate += slope * start[n_row + first + a]
+                bound += abs(slope) * total
+        least = solution.gap[i * s] + step * (min(rate, 0.0) - 0.5 * bound * step)
+        if bodies.radius[i] < 0.0 or least <= 0.0:  # the gap of a bore is not convex
+            solution.closed[n] = i
+            n += 1
+    return n
 
 
 @linked_sum
@@ -544,7 +631,7 @@ def fill_matrix(
     state: Ints,
     force: Floats,
     n_closed: int,
-    n_used: int,
+    blocks: tuple[int, int],
     has_place: bool,
     solution: Solution,
 ) -> bool:
@@ -557,6 +644,7 @@ def fill_matrix(
         solution.pushed,
         0,
     )
+    listed = (0, n_closed)
     fill_slopes(bodies, nodes, state, force, n_closed, solution)
     for r in range(solution.begun.size):
         solution.begun[r] = 0.0
@@ -572,12 +660,11 @@ def fill_matrix(
         i = solution.closed[c]
         for f in range(n_force(bodies, state[i])):
             for k in range(s):
-                for r in range(n_used):
+                for r in range(blocks[1] * n_row):
                     change[r] = 0.0
                 for a in range(n_local):
-                    size, rows = solution.direction[i * s + k, f, a], forced[k * n_row + i * n_local + a]
-                    for r in range(n_used):
-                        change[r] += size * rows[r]
+                    size, row = solution.direction[i * s + k, f, a], forced[k * n_row + i * n_local + a]
+                    add_response(bodies, size, row, blocks, listed, change, solution)
                 pushed[i, f, k] = 1.0
                 fill_column(bodies, nodes, tables, slot, state, force, n_closed, has_place, col, solution)
                 pushed[i, f, k] = 0.0
@@ -588,13 +675,12 @@ def fill_matrix(
             for b in range(n_local):
                 if b == TWIST:
                     continue
-                for r in range(n_used):
+                for r in range(blocks[1] * n_row):
                     change[r] = 0.0
                 for a in range(n_local):
-                    size, rows = solution.turning[i * s + k, a, b], forced[k * n_row + i * n_local + a]
+                    size, row = solution.turning[i * s + k, a, b], forced[k * n_row + i * n_local + a]
                     if size != 0.0:
-                        for r in range(n_used):
-                            change[r] += size * rows[r]
+                        add_response(bodies, size, row, blocks, listed, change, solution)
                 moved[k, i * n_local + b] = 1.0
                 fill_column(bodies, nodes, tables, slot, state, force, n_closed, has_place, col, solution)
                 moved[k, i * n_local + b] = 0.0
@@ -643,7 +729,9 @@ def code_of(state: Ints) -> int:
 
 
 @linked_sum
-def use_matrix(bodies: Bodies, tables: Tables, slot: int, state: Ints, has_place: bool, solution: Solution) -> int:
+def use_matrix(
+    bodies: Bodies, tables: Tables, slot: int, state: Ints, has_place: bool, solution: Solution
+) -> int:
     """Point at the matrix of a length of step and of states, with which it is made unless it was so before.
 
     Of straight gaps several are kept for each length of step: they do not change with the motion.
@@ -699,7 +787,6 @@ def take_step(
     is that at the solution, for the tangent.
     """
     s, n_local, n_row = nodes.at.size, bodies.n_local, bodies.load.shape[0]
-    n_y, first_row = (2 * s - 1) * n_row, int(np.int64(0))
     has_place = is_exact and not bodies.is_straight
     n_closed, n_pushed, n = list_closed(bodies, nodes, state, has_place, solution)
     place, residual, load, states = solution.place, solution.residual, solution.load, solution.states
@@ -707,11 +794,13 @@ def take_step(
     for c in range(n_closed):
         law = bodies.normal_law[solution.closed[c]]
         is_lean, is_linear = is_lean and law == LAGRANGE, is_linear and law != HERTZ
-    n_used = s * n_row if is_lean else n_y
+    used_blocks = (0, s if is_lean else 2 * s - 1)
+    step, forced = tables.tick * 2.0 ** (tables.first_level + slot), tables.forced[slot]
     code = use_matrix(bodies, tables, slot, state, has_place, solution)
     used = solution.used[0]
     see_motions(bodies, x, 2 * n_row, solution)
-    move_freely(tables.free[slot], x, first_row, n_used, solution)
+    listed = (0, n_closed)
+    move_freely(bodies, tables.free[slot], x, used_blocks, listed, solution.y_free, solution)
     for a in range(load.size):
         load[a] = 0.0
     for r in range(n_row):
@@ -721,7 +810,7 @@ def take_step(
         for k in range(s):
             see_gap(bodies, i, place[0], i * n_local, i * s + k, solution)
     push_closed(bodies, nodes, state, force, n_closed, solution)
-    respond(tables, slot, n_row, n_local, n_closed, first_row, n_used, solution)
+    respond(bodies, forced, n_closed, used_blocks, listed, load, solution.y_free, solution.y, solution)
     follow_loads(bodies, nodes, n_closed, solution)
     last, largest, iteration, n_made, is_solved, is_fresh = np.inf, 0.0, 0, 0, False, False
     while iteration < MOST_ITERATIONS:
@@ -730,14 +819,21 @@ def take_step(
             see_gaps(bodies, nodes, n_closed, solution)
         if has_place or iteration > 1:
             push_closed(bodies, nodes, state, force, n_closed, solution)
-            respond(tables, slot, n_row, n_local, n_closed, first_row, n_used, solution)
+            respond(
+                bodies, forced, n_closed, used_blocks, listed, load, solution.y_free, solution.y, solution
+            )
         if not has_place:
             follow_loads(bodies, nodes, n_closed, solution)
             see_gaps(bodies, nodes, n_closed, solution)
         if is_solved:
-            if is_whole and is_lean:
-                move_freely(tables.free[slot], x, n_used, n_y, solution)
-                respond(tables, slot, n_row, n_local, n_closed, n_used, n_y, solution)
+            if is_whole:
+                near = (n_closed, list_near(bodies, nodes, step, x, state, n_closed, solution))
+                for pairs, blocks in ((listed, (used_blocks[1], 2 * s - 1)), (near, (0, 2 * s - 2))):
+                    move_freely(bodies, tables.free[slot], x, blocks, pairs, solution.y_free, solution)
+                    respond(
+                        bodies, forced, n_closed, blocks, pairs, load, solution.y_free, solution.y, solution
+                    )
+                solution.used[1] = near[1]
             for c in range(n_closed):
                 see_pair(bodies, nodes, solution.closed[c], is_lean and not is_whole, solution)
             if not is_exact:
@@ -745,23 +841,19 @@ def take_step(
             if is_linear:
                 fill_slopes(bodies, nodes, state, force, n_closed, solution)
                 return iteration
-        fill_residual(
-            bodies, nodes, tables, slot, state, force, n_closed, is_lean, has_place, solution
-        )
+        fill_residual(bodies, nodes, tables, slot, state, force, n_closed, is_lean, has_place, solution)
         if states[used] == 0 or is_solved:
             states[used] = 0
             n_made += 1
             if not fill_matrix(
-                bodies, nodes, tables, slot, state, force, n_closed, n_used, has_place, solution
+                bodies, nodes, tables, slot, state, force, n_closed, used_blocks, has_place, solution
             ):
                 return -iteration
             states[used], is_fresh = code, True
             solution.noise[used] = noise_of(bodies, nodes, state, n_closed, n_pushed, n, solution)
             if is_solved:
                 return iteration
-            fill_residual(
-                bodies, nodes, tables, slot, state, force, n_closed, is_lean, has_place, solution
-            )
+            fill_residual(bodies, nodes, tables, slot, state, force, n_closed, is_lean, has_place, solution)
         solve_factorised(solution.matrix[used], solution.pivot[used], n, residual)
         change, largest, row = 0.0, 0.0, 0
         for r in range(n_pushed):

@@ -53,6 +53,7 @@ class Bodies(Struct):
     kick: Floats  # (R, nx), the same of the coordinates
     bend: Floats  # (R, nm), bound on the acceleration of a local motion by a unit mode, 1/s2
     compliance: Floats  # (R, R), acceleration of a local motion by a unit load, 1/kg
+    reach: Floats  # (R, R), the sum of what each mode contributes to it, in size
     kind: Ints  # (q,), FIXED or ROUND
     is_straight: bool  # all gaps are linear in the local motions
     radius: Floats  # (q,), of the rim, m; of a bore its clearance, negative
@@ -118,12 +119,13 @@ class Solution(Struct):
     turning: Floats  # (s q, n_local, n_local), change of a load with the local motions
     direction: Floats  # (s q, 2, n_local), of unknown forces
     residual: Floats  # (n,)
-    closed: Ints  # (q,), the closed pairs
+    closed: Ints  # (q,), the closed pairs, then open ones that may touch in the step
+    size: Floats  # (nm,), of modes
     matrix: Floats  # (k m, n, n), factors: m of each length of step
     pivot: Ints  # (k m, n)
     states: Ints  # (k m,), states of the pairs with which a matrix was made, as one number; 0: none
     noise: Floats  # (k m,), force that the rounding of displacements causes, N
-    used: Ints  # (1,), matrix of the last step
+    used: Ints  # (2,), matrix of the last step, and number of pairs that are closed or may touch in it
     change: Floats  # (ny,), of y
     moved: Floats  # (s, R), of `place`
     begun: Floats  # (3 R,), of `start`

@@ -189,12 +189,19 @@ def within_step(
     """Coordinates after a part of a step (s) under the loads of the whole; fills the factors `turn` (nm,)."""
     n_complex, n_row, s, power = bodies.n_complex, bodies.load.shape[0], nodes.at.size, nodes.power
     phi, monomial = np.empty(s + 1, np.complex128), np.zeros((s, n_row))
-    time, scale = step * part, step * part
+    time, scale, n_loaded, loaded = step * part, step * part, 0, np.empty(n_row, np.int64)
+    for r in range(n_row):
+        largest = 0.0
+        for j in range(s):
+            largest = max(largest, abs(load[j * n_row + r]))
+        if largest > 0.0:
+            loaded[n_loaded] = r
+            n_loaded += 1
     for m in range(s):
         for j in range(s):
             factor = power[j, m] * scale
-            for r in range(n_row):
-                monomial[m, r] += factor * load[j * n_row + r]
+            for p in range(n_loaded):
+                monomial[m, p] += factor * load[j * n_row + loaded[p]]
         scale *= part * (m + 1)
     for k in range(turn.size):
         fill_phi(bodies.exponent[k] * time, phi)
@@ -202,8 +209,8 @@ def within_step(
         total = 0j
         for m in range(s):
             pushed = 0j
-            for r in range(n_row):
-                pushed += bodies.load[r, k] * monomial[m, r]
+            for p in range(n_loaded):
+                pushed += bodies.load[loaded[p], k] * monomial[m, p]
             total += pushed * phi[m + 1]
         c, d = phi[0].real, phi[0].imag
         if k < n_complex:

@@ -24,9 +24,11 @@ from rubhpc.kernels.collocation.gaps import see_bend
 from rubhpc.kernels.collocation.impacts import find_forces, find_impulses, push_instant, see_rates
 from rubhpc.kernels.collocation.laws import static_friction
 from rubhpc.kernels.collocation.newton import (
+    add_response,
     change_pair,
     change_residual,
     list_closed,
+    move_freely,
     n_force,
     see_start,
     solve_factorised,
@@ -108,6 +110,7 @@ def carry_step(
     has_place = not bodies.is_straight
     n_closed, _, n = list_closed(bodies, nodes, state, has_place, solution)
     step, n_x = tables.tick * 2.0 ** (tables.first_level + slot), trail.column.size
+    blocks, listed = (0, 2 * s - 1), (0, n_closed)
     change, moved, begun, pushed = solution.change, solution.moved, solution.begun, solution.pushed
     column, load, target = trail.column, trail.load, solution.residual
     forced, free, local = tables.forced[slot], tables.free[slot], bodies.local
@@ -122,11 +125,7 @@ def carry_step(
             for k in range(n_x):
                 total += local[r, k] * column[k]
             begun[r] = total
-        for r in range(change.size):
-            total = 0.0
-            for k in range(n_x):
-                total += free[r, k] * column[k]
-            change[r] = total
+        move_freely(bodies, free, column, blocks, listed, change, solution)
         for k in range(s):
             for r in range(n_row):
                 moved[k, r] = 0.0
@@ -144,8 +143,7 @@ def carry_step(
                 for b in range(n_local):
                     total += solution.turning[i * s, a, b] * begun[first + b]
                 load[first + a] = total
-                for r in range(change.size):
-                    change[r] += total * forced[first + a, r]
+                add_response(bodies, total, forced[first + a], blocks, listed, change, solution)
         row = 0
         for p in range(n_closed):
             i = solution.closed[p]
