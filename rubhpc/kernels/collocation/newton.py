@@ -57,6 +57,7 @@ Ints = NDArray[np.int64]
 
 MOST_ITERATIONS = 26
 ROUNDING = 2e-16  # of displacements
+WIDE = 4  # times as many rows in one loop take less time than short loops
 SLOW = 0.2  # of the last change: with less progress the matrix is made anew
 
 
@@ -200,7 +201,7 @@ def add_response(
     """Add the response to a load, its `size` times a row of `Tables.forced`, to blocks of y of listed pairs."""
     n_local, n_row, closed = bodies.n_local, bodies.load.shape[0], solution.closed
     begin, end = blocks[0] * n_row, blocks[1] * n_row
-    if pairs[1] - pairs[0] == closed.size:
+    if n_row <= WIDE * (pairs[1] - pairs[0]) * n_local:
         for r in range(begin, end):
             y[r] += size * row[r]
         return
@@ -225,11 +226,8 @@ def respond(
 ) -> None:
     """Motions y of listed pairs under the loads of the closed ones, in blocks of y."""
     n_local, n_row, closed = bodies.n_local, bodies.load.shape[0], solution.closed
-    for block in range(blocks[0] * n_row, blocks[1] * n_row, n_row):
-        for p in range(pairs[0], pairs[1]):
-            first = block + closed[p] * n_local
-            for r in range(first, first + n_local):
-                y[r] = y_free[r]
+    for r in range(blocks[0] * n_row, blocks[1] * n_row):
+        y[r] = y_free[r]
     for node in range(0, load.size, n_row):
         for c in range(n_closed):
             begun = node + closed[c] * n_local
@@ -794,13 +792,14 @@ def take_step(
     for c in range(n_closed):
         law = bodies.normal_law[solution.closed[c]]
         is_lean, is_linear = is_lean and law == LAGRANGE, is_linear and law != HERTZ
-    used_blocks = (0, s if is_lean else 2 * s - 1)
+    n_block, free = 2 * s - 1, tables.free[slot]
+    used_blocks = (0, s if is_lean else n_block)
     step, forced = tables.tick * 2.0 ** (tables.first_level + slot), tables.forced[slot]
     code = use_matrix(bodies, tables, slot, state, has_place, solution)
     used = solution.used[0]
     see_motions(bodies, x, 2 * n_row, solution)
     listed = (0, n_closed)
-    move_freely(bodies, tables.free[slot], x, used_blocks, listed, solution.y_free, solution)
+    move_freely(bodies, free, x, used_blocks, listed, solution.y_free, solution)
     for a in range(load.size):
         load[a] = 0.0
     for r in range(n_row):
@@ -827,13 +826,14 @@ def take_step(
             see_gaps(bodies, nodes, n_closed, solution)
         if is_solved:
             if is_whole:
-                near = (n_closed, list_near(bodies, nodes, step, x, state, n_closed, solution))
-                for pairs, blocks in ((listed, (used_blocks[1], 2 * s - 1)), (near, (0, 2 * s - 2))):
-                    move_freely(bodies, tables.free[slot], x, blocks, pairs, solution.y_free, solution)
-                    respond(
-                        bodies, forced, n_closed, blocks, pairs, load, solution.y_free, solution.y, solution
-                    )
-                solution.used[1] = near[1]
+                n_near = list_near(bodies, nodes, step, x, state, n_closed, solution)
+                near, rest = (0, n_near), (used_blocks[1] if n_near == n_closed else 0, n_block)
+                move_freely(
+                    bodies, free, x, (used_blocks[1], n_block), listed, solution.y_free, solution
+                )
+                move_freely(bodies, free, x, (0, n_block), (n_closed, n_near), solution.y_free, solution)
+                respond(bodies, forced, n_closed, rest, near, load, solution.y_free, solution.y, solution)
+                solution.used[1] = n_near
             for c in range(n_closed):
                 see_pair(bodies, nodes, solution.closed[c], is_lean and not is_whole, solution)
             if not is_exact:
