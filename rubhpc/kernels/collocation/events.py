@@ -22,7 +22,7 @@ from rubhpc.kernels.collocation.structures import (
     Nodes,
     Solution,
 )
-from rubhpc.kernels.collocation.tables import rate_row
+from rubhpc.kernels.collocation.tables import place_row, rate_row
 from rubhpc.kernels.laws import LAGRANGE, PENALTY
 
 Floats = NDArray[np.float64]
@@ -104,9 +104,9 @@ def fill_events(
             if state[i] == OPEN:
                 if not is_near(i, solution):
                     continue
-                at, v = (solution.start, first) if k == 0 else (solution.y, (k - 1) * n_row + first)
+                at, v = (solution.start, first) if k == 0 else (solution.y, place_row(s, n_local, i, k))
                 see_gap(bodies, i, at, v, row, solution)
-                v = n_row + first if k == 0 else rate_row(s, n_row, k) + first
+                v = n_row + first if k == 0 else rate_row(s, n_local, i, k)
                 rate = 0.0
                 for a in range(n_local):
                     rate += solution.normal[row, a] * at[v + a]

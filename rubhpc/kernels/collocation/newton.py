@@ -49,7 +49,7 @@ from rubhpc.kernels.collocation.structures import (
     Solution,
     Tables,
 )
-from rubhpc.kernels.collocation.tables import bend_row, rate_row
+from rubhpc.kernels.collocation.tables import bend_row, place_row, rate_row
 from rubhpc.kernels.laws import HERTZ, LAGRANGE
 
 Floats = NDArray[np.float64]
@@ -57,7 +57,6 @@ Ints = NDArray[np.int64]
 
 MOST_ITERATIONS = 26
 ROUNDING = 2e-16  # of displacements
-WIDE = 4  # times as many rows in one loop take less time than short loops
 SLOW = 0.2  # of the last change: with less progress the matrix is made anew
 
 
@@ -169,7 +168,8 @@ def push_closed(
 @linked_sum
 def move_freely(
     bodies: Bodies,
-    rows: Floats,
+    s: int,
+    free: Floats,
     x: Floats,
     blocks: tuple[int, int],
     pairs: tuple[int, int],
@@ -177,20 +177,20 @@ def move_freely(
     solution: Solution,
 ) -> None:
     """Motions y of listed pairs without loads, in blocks of y: displacements at the nodes, and so on."""
-    n_local, n_row = bodies.n_local, bodies.load.shape[0]
-    for block in range(blocks[0], blocks[1]):
-        for p in range(pairs[0], pairs[1]):
-            first = block * n_row + solution.closed[p] * n_local
-            for r in range(first, first + n_local):
-                row, total = rows[r], 0.0
-                for k in range(x.size):
-                    total += row[k] * x[k]
-                y[r] = total
+    n_local = bodies.n_local
+    for p in range(pairs[0], pairs[1]):
+        first = place_row(s, n_local, solution.closed[p], 1)
+        for r in range(first + blocks[0] * n_local, first + blocks[1] * n_local):
+            row, total = free[r], 0.0
+            for k in range(x.size):
+                total += row[k] * x[k]
+            y[r] = total
 
 
 @linked_sum
 def add_response(
     bodies: Bodies,
+    s: int,
     size: float,
     row: Floats,
     blocks: tuple[int, int],
@@ -198,41 +198,39 @@ def add_response(
     y: Floats,
     solution: Solution,
 ) -> None:
-    """Add the response to a load, its `size` times a row of `Tables.forced`, to blocks of y of listed pairs."""
-    n_local, n_row, closed = bodies.n_local, bodies.load.shape[0], solution.closed
-    begin, end = blocks[0] * n_row, blocks[1] * n_row
-    if n_row <= WIDE * (pairs[1] - pairs[0]) * n_local:
-        for r in range(begin, end):
+    """Add the response to a load, of a row of `Tables.forced`, to blocks of y of listed pairs."""
+    n_local = bodies.n_local
+    for p in range(pairs[0], pairs[1]):
+        first = place_row(s, n_local, solution.closed[p], 1)
+        for r in range(first + blocks[0] * n_local, first + blocks[1] * n_local):
             y[r] += size * row[r]
-        return
-    for block in range(begin, end, n_row):
-        for p in range(pairs[0], pairs[1]):
-            first = block + closed[p] * n_local
-            for r in range(first, first + n_local):
-                y[r] += size * row[r]
 
 
 @linked_sum
 def respond(
     bodies: Bodies,
+    s: int,
     forced: Floats,
     n_closed: int,
     blocks: tuple[int, int],
     pairs: tuple[int, int],
     load: Floats,
-    y_free: Floats,
-    y: Floats,
     solution: Solution,
 ) -> None:
     """Motions y of listed pairs under the loads of the closed ones, in blocks of y."""
-    n_local, n_row, closed = bodies.n_local, bodies.load.shape[0], solution.closed
-    for r in range(blocks[0] * n_row, blocks[1] * n_row):
-        y[r] = y_free[r]
-    for node in range(0, load.size, n_row):
-        for c in range(n_closed):
-            begun = node + closed[c] * n_local
-            for a in range(begun, begun + n_local):
-                add_response(bodies, load[a], forced[a], blocks, pairs, y, solution)
+    n_local, n_row, closed, y = bodies.n_local, bodies.load.shape[0], solution.closed, solution.y
+    for p in range(pairs[0], pairs[1]):
+        first = place_row(s, n_local, closed[p], 1)
+        begin, end = first + blocks[0] * n_local, first + blocks[1] * n_local
+        for r in range(begin, end):
+            y[r] = solution.y_free[r]
+        for node in range(0, load.size, n_row):
+            for c in range(n_closed):
+                begun = node + closed[c] * n_local
+                for a in range(begun, begun + n_local):
+                    size, row = load[a], forced[a]
+                    for r in range(begin, end):
+                        y[r] += size * row[r]
 
 
 @linked_sum
@@ -297,11 +295,11 @@ def see_pair(bodies: Bodies, nodes: Nodes, i: int, is_lean: bool, solution: Solu
         seen[GAP] = solution.gap[row]
         if k > 0:
             moved = solution.place[k, first + ACROSS] - solution.place[0, first + ACROSS]
-            twisted = solution.y[(k - 1) * n_row + first + TWIST] - solution.start[first + TWIST]
+            twisted = solution.y[place_row(s, n_local, i, k) + TWIST] - solution.start[first + TWIST]
             seen[TURNED] = twisted - slip_path(bodies, i, row, i * s, moved, solution)
         if is_lean and 0 < k < s - 1:
             continue
-        rates, v = (solution.start, n_row + first) if k == 0 else (solution.y, rate_row(s, n_row, k) + first)
+        rates, v = (solution.start, n_row + first) if k == 0 else (solution.y, rate_row(s, n_local, i, k))
         rate, across = 0.0, 0.0
         for a in range(n_local):
             rate += normal[a] * rates[v + a]
@@ -311,7 +309,7 @@ def see_pair(bodies: Bodies, nodes: Nodes, i: int, is_lean: bool, solution: Solu
         seen[WIDENED] = seen[GAP] * solution.curvature[row] * across
         if is_last and not is_hard:
             see_bend(bodies, row, solution)
-            total, at = 0.0, bend_row(s, n_row) + first
+            total, at = 0.0, bend_row(s, n_local, i)
             for a in range(n_local):
                 total += normal[a] * solution.y[at + a]
                 for b in range(n_local):
@@ -333,7 +331,7 @@ def fill_residual(
     solution: Solution,
 ) -> None:
     """Fill the residuals of all equations."""
-    s, n_local, n_row, residual = nodes.at.size, bodies.n_local, bodies.load.shape[0], solution.residual
+    s, n_local, residual = nodes.at.size, bodies.n_local, solution.residual
     step, fade, row = tables.tick * 2.0 ** (tables.first_level + slot), tables.fade[slot], 0
     for c in range(n_closed):
         i = solution.closed[c]
@@ -372,12 +370,12 @@ def fill_residual(
                 residual[row + k] = t[k] - state[i] * friction_ratio(bodies, i, seen[k, SLIP])[0] * n[k]
             row += s
     for c in range(n_closed if has_place else 0):
-        first_row = solution.closed[c] * n_local
+        i = solution.closed[c]
         for k in range(1, s):
+            at = place_row(s, n_local, i, k)
             for a in range(n_local):
                 if a != TWIST:
-                    at = first_row + a
-                    residual[row] = solution.place[k, at] - solution.y[(k - 1) * n_row + at]
+                    residual[row] = solution.place[k, i * n_local + a] - solution.y[at + a]
                     row += 1
 
 
@@ -402,9 +400,7 @@ def fill_slopes(
                 solution.direction[row, FRICTION, a] = tangent[a]
                 for b in range(n_local):
                     solution.turning[row, a, b] = n * of_normal[a, b] + t * of_tangent[a, b]
-            rates, v = (
-                (solution.start, n_row + first) if k == 0 else (solution.y, rate_row(s, n_row, k) + first)
-            )
+            rates, v = (solution.start, n_row + first) if k == 0 else (solution.y, rate_row(s, n_local, i, k))
             bent = solution.bent[row]
             for a in range(n_local):
                 of_rate, of_slip = 0.0, 0.0
@@ -419,7 +415,7 @@ def fill_slopes(
             if bodies.normal_law[i] != LAGRANGE:
                 fill_spring_slopes(bodies, i, row, solution)
                 if is_last and bodies.damping[i] > 0.0:
-                    fill_bend_slope(bodies, i, row, v, bend_row(s, n_row) + first, solution)
+                    fill_bend_slope(bodies, i, row, v, bend_row(s, n_local, i), solution)
 
 
 @linked_sum
@@ -493,8 +489,8 @@ def change_pair(
         for a in range(n_local):
             gap += normal[a] * moved[k, first + a]
         changed[GAP] = gap
-        rates, v = (begun, n_row + first) if k == 0 else (change, rate_row(s, n_row, k) + first)
-        twist = begun[first + TWIST] if k == 0 else change[(k - 1) * n_row + first + TWIST]
+        rates, v = (begun, n_row + first) if k == 0 else (change, rate_row(s, n_local, i, k))
+        twist = begun[first + TWIST] if k == 0 else change[place_row(s, n_local, i, k) + TWIST]
         rate, across, turned, sideways = 0.0, 0.0, 0.0, 0.0
         for a in range(n_local):
             rate += normal[a] * rates[v + a] + bent[OF_RATE, a] * moved[k, first + a]
@@ -512,7 +508,7 @@ def change_pair(
         widened = (1.0 - seen[GAP] * bow) * (seen[WIDENED] / seen[GAP] if seen[GAP] != 0.0 else 0.0)
         changed[WIDENED] = widened * gap + seen[GAP] * bow * across
         if is_last and not is_hard:
-            total, at = 0.0, bend_row(s, n_row) + first
+            total, at = 0.0, bend_row(s, n_local, i)
             for a in range(n_local):
                 total += normal[a] * change[at + a] + 2.0 * bent[OF_RATE, a] * rates[v + a]
                 total += bent[OF_BEND, a] * moved[k, first + a]
@@ -593,27 +589,26 @@ def fill_column(
     solution: Solution,
 ) -> None:
     """Fill a column of the matrix by the changes `change`, `moved` and `pushed` of one unknown."""
-    s, n_local, n_row = nodes.at.size, bodies.n_local, bodies.load.shape[0]
-    target, row = solution.residual, 0
+    s, n_local, row = nodes.at.size, bodies.n_local, 0
+    target, change, moved = solution.residual, solution.change, solution.moved
     if not has_place:
         for c in range(n_closed):
-            first = solution.closed[c] * n_local
+            i = solution.closed[c]
             for k in range(1, s):
-                for a in range(first, first + n_local):
-                    solution.moved[k, a] = solution.change[(k - 1) * n_row + a]
+                for a in range(n_local):
+                    moved[k, i * n_local + a] = change[place_row(s, n_local, i, k) + a]
     for c in range(n_closed):
         i = solution.closed[c]
-        change_pair(bodies, nodes, i, 1, solution.begun, solution.change, solution.moved, solution)
+        change_pair(bodies, nodes, i, 1, solution.begun, change, moved, solution)
         row = change_residual(
             bodies, nodes, tables, slot, state, force, i, solution.pushed[i], row, target, solution
         )
     for c in range(n_closed if has_place else 0):
-        first = solution.closed[c] * n_local
+        i = solution.closed[c]
         for k in range(1, s):
             for a in range(n_local):
                 if a != TWIST:
-                    at = first + a
-                    target[row] = solution.moved[k, at] - solution.change[(k - 1) * n_row + at]
+                    target[row] = moved[k, i * n_local + a] - change[place_row(s, n_local, i, k) + a]
                     row += 1
     matrix = solution.matrix[solution.used[0]]
     for r in range(row):
@@ -658,11 +653,11 @@ def fill_matrix(
         i = solution.closed[c]
         for f in range(n_force(bodies, state[i])):
             for k in range(s):
-                for r in range(blocks[1] * n_row):
+                for r in range(change.size):
                     change[r] = 0.0
                 for a in range(n_local):
                     size, row = solution.direction[i * s + k, f, a], forced[k * n_row + i * n_local + a]
-                    add_response(bodies, size, row, blocks, listed, change, solution)
+                    add_response(bodies, s, size, row, blocks, listed, change, solution)
                 pushed[i, f, k] = 1.0
                 fill_column(bodies, nodes, tables, slot, state, force, n_closed, has_place, col, solution)
                 pushed[i, f, k] = 0.0
@@ -673,12 +668,12 @@ def fill_matrix(
             for b in range(n_local):
                 if b == TWIST:
                     continue
-                for r in range(blocks[1] * n_row):
+                for r in range(change.size):
                     change[r] = 0.0
                 for a in range(n_local):
                     size, row = solution.turning[i * s + k, a, b], forced[k * n_row + i * n_local + a]
                     if size != 0.0:
-                        add_response(bodies, size, row, blocks, listed, change, solution)
+                        add_response(bodies, s, size, row, blocks, listed, change, solution)
                 moved[k, i * n_local + b] = 1.0
                 fill_column(bodies, nodes, tables, slot, state, force, n_closed, has_place, col, solution)
                 moved[k, i * n_local + b] = 0.0
@@ -756,12 +751,12 @@ def see_gaps(bodies: Bodies, nodes: Nodes, n_closed: int, solution: Solution) ->
 @linked_sum
 def follow_loads(bodies: Bodies, nodes: Nodes, n_closed: int, solution: Solution) -> None:
     """Take the displacements of the closed pairs at the nodes from y."""
-    n_local, n_row = bodies.n_local, bodies.load.shape[0]
+    s, n_local = nodes.at.size, bodies.n_local
     for c in range(n_closed):
-        first = solution.closed[c] * n_local
-        for k in range(1, nodes.at.size):
-            for a in range(first, first + n_local):
-                solution.place[k, a] = solution.y[(k - 1) * n_row + a]
+        i = solution.closed[c]
+        for k in range(1, s):
+            for a in range(n_local):
+                solution.place[k, i * n_local + a] = solution.y[place_row(s, n_local, i, k) + a]
 
 
 @linked_sum
@@ -799,7 +794,7 @@ def take_step(
     used = solution.used[0]
     see_motions(bodies, x, 2 * n_row, solution)
     listed = (0, n_closed)
-    move_freely(bodies, free, x, used_blocks, listed, solution.y_free, solution)
+    move_freely(bodies, s, free, x, used_blocks, listed, solution.y_free, solution)
     for a in range(load.size):
         load[a] = 0.0
     for r in range(n_row):
@@ -809,7 +804,7 @@ def take_step(
         for k in range(s):
             see_gap(bodies, i, place[0], i * n_local, i * s + k, solution)
     push_closed(bodies, nodes, state, force, n_closed, solution)
-    respond(bodies, forced, n_closed, used_blocks, listed, load, solution.y_free, solution.y, solution)
+    respond(bodies, s, forced, n_closed, used_blocks, listed, load, solution)
     follow_loads(bodies, nodes, n_closed, solution)
     last, largest, iteration, n_made, is_solved, is_fresh = np.inf, 0.0, 0, 0, False, False
     while iteration < MOST_ITERATIONS:
@@ -818,9 +813,7 @@ def take_step(
             see_gaps(bodies, nodes, n_closed, solution)
         if has_place or iteration > 1:
             push_closed(bodies, nodes, state, force, n_closed, solution)
-            respond(
-                bodies, forced, n_closed, used_blocks, listed, load, solution.y_free, solution.y, solution
-            )
+            respond(bodies, s, forced, n_closed, used_blocks, listed, load, solution)
         if not has_place:
             follow_loads(bodies, nodes, n_closed, solution)
             see_gaps(bodies, nodes, n_closed, solution)
@@ -828,11 +821,9 @@ def take_step(
             if is_whole:
                 n_near = list_near(bodies, nodes, step, x, state, n_closed, solution)
                 near, rest = (0, n_near), (used_blocks[1] if n_near == n_closed else 0, n_block)
-                move_freely(
-                    bodies, free, x, (used_blocks[1], n_block), listed, solution.y_free, solution
-                )
-                move_freely(bodies, free, x, (0, n_block), (n_closed, n_near), solution.y_free, solution)
-                respond(bodies, forced, n_closed, rest, near, load, solution.y_free, solution.y, solution)
+                move_freely(bodies, s, free, x, (used_blocks[1], n_block), listed, solution.y_free, solution)
+                move_freely(bodies, s, free, x, (0, n_block), (n_closed, n_near), solution.y_free, solution)
+                respond(bodies, s, forced, n_closed, rest, near, load, solution)
                 solution.used[1] = n_near
             for c in range(n_closed):
                 see_pair(bodies, nodes, solution.closed[c], is_lean and not is_whole, solution)

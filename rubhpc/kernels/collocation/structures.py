@@ -76,8 +76,8 @@ class Bodies(Struct):
 class Tables(Struct):
     """Steps of 2^(first_level + slot) ticks, filled when first taken.
 
-    Rows y of a step: local displacements at the nodes after the first, velocities at the last node, then at
-    those between, accelerations at the last (`rate_row`).
+    Rows y of a step: of each pair the local displacements at the nodes after the first, velocities at the
+    last node, then at those between, and accelerations at the last (`tables.row_of`).
     """
 
     first_level: int

@@ -57,15 +57,30 @@ def fill_phi(x: complex, phi: Complexes) -> None:
 
 
 @linked_sum
-def rate_row(s: int, n_row: int, node: int) -> int:
-    """First row of `y` with the velocities at a node after the first."""
-    return (s - 1) * n_row + (0 if node == s - 1 else node * n_row)
+def place_row(s: int, n_local: int, pair: int, node: int) -> int:
+    """First row of `y` with the displacements of a pair at a node after the first."""
+    return (pair * (2 * s - 1) + node - 1) * n_local
 
 
 @linked_sum
-def bend_row(s: int, n_row: int) -> int:
-    """First row of `y` with the accelerations at the end."""
-    return (2 * s - 2) * n_row
+def rate_row(s: int, n_local: int, pair: int, node: int) -> int:
+    """First row of `y` with the velocities of a pair at a node after the first."""
+    return (pair * (2 * s - 1) + s - 1 + (0 if node == s - 1 else node)) * n_local
+
+
+@linked_sum
+def bend_row(s: int, n_local: int, pair: int) -> int:
+    """First row of `y` with the accelerations of a pair at the end."""
+    return (pair * (2 * s - 1) + 2 * s - 2) * n_local
+
+
+@linked_sum
+def row_of(s: int, n_local: int, r: int, kind: int, node: int) -> int:
+    """Row of `y` of a local motion at a node: its displacement, velocity or acceleration (`kind`)."""
+    pair, a = r // n_local, r % n_local
+    if kind == 0:
+        return place_row(s, n_local, pair, node) + a
+    return (rate_row(s, n_local, pair, node) if kind == 1 else bend_row(s, n_local, pair)) + a
 
 
 @linked_sum
@@ -122,21 +137,15 @@ def fill_step(bodies: Bodies, nodes: Nodes, tables: Tables, slot: int) -> None:
                     if k < n_complex:
                         moved[j * n_row + r, n_complex + k] = value.imag
             for kind in range(n_kind):
-                row = (i - 1) * n_row
-                if kind > 0:
-                    row = rate_row(s, n_row, i) if kind == 1 else bend_row(s, n_row)
                 for r in range(n_row):
-                    at = kind * n_row + r
+                    at, row = kind * n_row + r, row_of(s, bodies.n_local, r, kind, i)
                     if k < n_complex:
                         a, b = local[at, k], local[at, n_complex + k]
-                        free[row + r, k] = a * turn.real + b * turn.imag
-                        free[row + r, n_complex + k] = b * turn.real - a * turn.imag
+                        free[row, k] = a * turn.real + b * turn.imag
+                        free[row, n_complex + k] = b * turn.real - a * turn.imag
                     else:
-                        free[row + r, re] = local[at, re] * turn.real
+                        free[row, re] = local[at, re] * turn.real
         for kind in range(n_kind):
-            row = (i - 1) * n_row
-            if kind > 0:
-                row = rate_row(s, n_row, i) if kind == 1 else bend_row(s, n_row)
             for col in range(s * n_row):
                 for r in range(n_row):
                     total = 0.0
@@ -144,7 +153,7 @@ def fill_step(bodies: Bodies, nodes: Nodes, tables: Tables, slot: int) -> None:
                         total += moved[col, k] * local[kind * n_row + r, k]
                     if kind == 2 and col >= (s - 1) * n_row:
                         total += bodies.compliance[r, col - (s - 1) * n_row]
-                    forced[col, row + r] = total
+                    forced[col, row_of(s, bodies.n_local, r, kind, i)] = total
         if is_last:
             for col in range(s * n_row):
                 for k in range(n_x):

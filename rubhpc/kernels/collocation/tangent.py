@@ -44,7 +44,7 @@ from rubhpc.kernels.collocation.structures import (
     Solution,
     Tables,
 )
-from rubhpc.kernels.collocation.tables import end_of_step, within_step
+from rubhpc.kernels.collocation.tables import end_of_step, place_row, row_of, within_step
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -125,14 +125,14 @@ def carry_step(
             for k in range(n_x):
                 total += local[r, k] * column[k]
             begun[r] = total
-        move_freely(bodies, free, column, blocks, listed, change, solution)
+        move_freely(bodies, s, free, column, blocks, listed, change, solution)
         for k in range(s):
             for r in range(n_row):
                 moved[k, r] = 0.0
                 if k == 0:
                     moved[k, r] = begun[r]
                 elif not has_place:
-                    moved[k, r] = change[(k - 1) * n_row + r]
+                    moved[k, r] = change[row_of(s, n_local, r, 0, k)]
         for r in range(load.size):
             load[r] = 0.0
         for p in range(n_closed):  # loads turn with the motion at the first node
@@ -143,7 +143,7 @@ def carry_step(
                 for b in range(n_local):
                     total += solution.turning[i * s, a, b] * begun[first + b]
                 load[first + a] = total
-                add_response(bodies, total, forced[first + a], blocks, listed, change, solution)
+                add_response(bodies, s, total, forced[first + a], blocks, listed, change, solution)
         row = 0
         for p in range(n_closed):
             i = solution.closed[p]
@@ -152,11 +152,11 @@ def carry_step(
                 bodies, nodes, tables, slot, state, force, i, pushed[i], row, target, solution
             )
         for p in range(n_closed if has_place else 0):
-            first = solution.closed[p] * n_local
             for k in range(1, s):
+                first = place_row(s, n_local, solution.closed[p], k)
                 for a in range(n_local):
                     if a != TWIST:
-                        target[row] = -change[(k - 1) * n_row + first + a]
+                        target[row] = -change[first + a]
                         row += 1
         solve_factorised(solution.matrix[solution.used[0]], solution.pivot[solution.used[0]], n, target)
         row = 0
