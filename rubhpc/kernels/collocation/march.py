@@ -80,7 +80,7 @@ Ints = NDArray[np.int64]
 
 KNOWN, NEW, SETTLED = range(3)  # of a case that begins: forces and states; neither; states alone
 STEPPING, TRYING, SETTLING = range(3)  # what is to be done next while a pair is closed
-ALLOWED, RECORDED = 3.0, 0.3  # error of the forces of a step over the accuracy, before the record and in it
+ALLOWED, RECORDED = 3.0, 0.1  # error of the forces of a step over the accuracy, before the record and in it
 NEWTON = 0.03  # tolerance of the forces in Newton's method, over that of the steps
 EASY = 0.5  # the same before a record
 AVERAGED = 20e-6  # s: the error of a shorter step counts as that of its impulse over that time
@@ -517,7 +517,7 @@ def advance_by_collocation(
             if not tables.is_filled[slot]:
                 fill_step(bodies, nodes, tables, slot)
             step = tables.tick * 2.0 ** (tables.first_level + slot)
-            is_exact = trail is not None and todo == STEPPING
+            is_exact = trail is not None and trail.columns.shape[1] > 0 and todo == STEPPING
             is_whole = is_recorded or bodies.is_sticky or is_exact or state.size > 1
             n_iteration = take_step(
                 bodies,

@@ -868,7 +868,12 @@ def take_step(
                         place[k, first + a] -= residual[row]
                         row += 1
         floor = max(tolerance, solution.noise[used])
-        if is_linear or change <= floor or (iteration > 1 and change * min(1.0, change / last) <= tolerance):
+        has_followed = iteration > 1 or bodies.is_straight  # loads have turned with the motion
+        if (
+            is_linear
+            or (has_followed and change <= floor)
+            or (iteration > 1 and change * min(1.0, change / last) <= tolerance)
+        ):
             is_solved = True
         elif iteration > 3 and change > 0.1 * last and (change < 1e-7 * largest or change < 30.0 * floor):
             is_solved = True  # rounding: no further progress
