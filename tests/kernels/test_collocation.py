@@ -198,9 +198,9 @@ class Step:
         self.x = march._modes.coordinates(march._motion + 1e-4 * rng.normal(size=march._motion.size))
         interpreted(newton.see_start)(bodies, self.x, self.solution)
         self.n_closed, self.n_pushed, self.n = interpreted(newton.list_closed)(
-            bodies, self.nodes, self.state, self.has_place, self.solution
+            bodies, self.nodes, self.state, self.solution
         )
-        interpreted(newton.use_matrix)(bodies, self.tables, slot, self.state, self.has_place, self.solution)
+        interpreted(newton.use_matrix)(bodies, self.tables, slot, self.state, self.solution)
         self.solution.y_free[:] = self.tables.free[slot] @ self.x
         self.force = 5.0 + rng.normal(size=(len(self.state), 2, s))
         self.force[:, FRICTION] *= 0.2
@@ -239,9 +239,7 @@ class Step:
             interpreted(newton.follow_loads)(self.bodies, self.nodes, self.n_closed, solution)
             interpreted(newton.see_gaps)(self.bodies, self.nodes, self.n_closed, solution)
         is_lean = False
-        interpreted(newton.fill_residual)(
-            *given[:2], self.tables, self.slot, *given[2:5], is_lean, self.has_place, solution
-        )
+        interpreted(newton.fill_residual)(*given[:2], self.tables, self.slot, *given[2:5], is_lean, solution)
         return self.solution.residual[: self.n].copy()
 
     def by_differences(self):
@@ -261,7 +259,7 @@ class Step:
         self.residual()
         given = self.bodies, self.nodes, self.tables, self.slot, self.state, self.force
         blocks = 0, 2 * self.nodes.at.size - 1
-        assert interpreted(newton.fill_matrix)(*given, self.n_closed, blocks, self.has_place, self.solution)
+        assert interpreted(newton.fill_matrix)(*given, self.n_closed, blocks, self.solution)
         used = self.solution.used[0]
         factors, pivot = (of[used, : self.n] for of in (self.solution.matrix, self.solution.pivot))
         factors = factors[:, : self.n]

@@ -82,7 +82,6 @@ KNOWN, NEW, SETTLED = range(3)  # of a case that begins: forces and states; neit
 STEPPING, TRYING, SETTLING = range(3)  # what is to be done next while a pair is closed
 ALLOWED, RECORDED = 3.0, 0.1  # error of the forces of a step over the accuracy, before the record and in it
 NEWTON = 0.03  # tolerance of the forces in Newton's method, over that of the steps
-EASY = 0.5  # the same before a record
 AVERAGED = 20e-6  # s: the error of a shorter step counts as that of its impulse over that time
 BEGINNING = 1.0 / 125.0  # first step of a contact over the last contact of the pair
 GROWING = 60.0  # steps are doubled where their error is so much less than the tolerance
@@ -527,7 +526,7 @@ def advance_by_collocation(
                 x,
                 state,
                 solution.guess,
-                (NEWTON if is_recorded or trail is not None else EASY) * accuracy * memory.scale,
+                NEWTON * accuracy * memory.scale,
                 is_whole,
                 is_exact,
                 solution,
@@ -625,7 +624,7 @@ def advance_by_collocation(
                 if is_recorded:
                     if not signals.is_filled[slot]:
                         fill_signals(bodies, nodes, tables, signals, slot)
-                    n_closed = list_closed(bodies, nodes, state, False, solution)[0]
+                    n_closed = list_closed(bodies, nodes, state, solution)[0]
                     record_step(
                         bodies,
                         nodes,

@@ -1,8 +1,8 @@
 """A step of closed contacts: forces that obey the laws at the nodes, by Newton's method.
 
 Unknown are the forces of the closed pairs at the nodes, N and, unless friction is a constant multiple of it,
-T. The loads turn with the local displacements at the nodes: these are those of the iteration before, or,
-where Newton's method needs exact slopes, unknown too (`has_place`). The equations are
+T; and, where gaps are curved, the local displacements at the nodes after the first, by which the loads turn.
+Straight gaps with linear laws need one iteration. The equations are
 
 - hard contact: `gap = faded error` at the nodes after the first, and the rate of it at the end;
 - springs: `N = law(gap, rate)` at the nodes after the first, and its rate at the end;
@@ -116,9 +116,7 @@ def n_force(bodies: Bodies, state: int) -> int:
 
 
 @linked_sum
-def list_closed(
-    bodies: Bodies, nodes: Nodes, state: Ints, has_place: bool, solution: Solution
-) -> tuple[int, int, int]:
+def list_closed(bodies: Bodies, nodes: Nodes, state: Ints, solution: Solution) -> tuple[int, int, int]:
     """Number of closed pairs, which are listed, and of unknown forces and of all unknowns."""
     s, n_closed, n_unknown = nodes.at.size, 0, 0
     for i in range(state.size):
@@ -126,7 +124,7 @@ def list_closed(
             solution.closed[n_closed] = i
             n_closed += 1
             n_unknown += s * n_force(bodies, state[i])
-    n_place = n_closed * (s - 1) * (bodies.n_local - 1) if has_place else 0
+    n_place = 0 if bodies.is_straight else n_closed * (s - 1) * (bodies.n_local - 1)
     return n_closed, n_unknown, n_unknown + n_place
 
 
@@ -327,7 +325,6 @@ def fill_residual(
     force: Floats,
     n_closed: int,
     is_lean: bool,
-    has_place: bool,
     solution: Solution,
 ) -> None:
     """Fill the residuals of all equations."""
@@ -369,7 +366,7 @@ def fill_residual(
             for k in range(s):
                 residual[row + k] = t[k] - state[i] * friction_ratio(bodies, i, seen[k, SLIP])[0] * n[k]
             row += s
-    for c in range(n_closed if has_place else 0):
+    for c in range(0 if bodies.is_straight else n_closed):
         i = solution.closed[c]
         for k in range(1, s):
             at = place_row(s, n_local, i, k)
@@ -584,14 +581,13 @@ def fill_column(
     state: Ints,
     force: Floats,
     n_closed: int,
-    has_place: bool,
     col: int,
     solution: Solution,
 ) -> None:
     """Fill a column of the matrix by the changes `change`, `moved` and `pushed` of one unknown."""
     s, n_local, row = nodes.at.size, bodies.n_local, 0
     target, change, moved = solution.residual, solution.change, solution.moved
-    if not has_place:
+    if bodies.is_straight:
         for c in range(n_closed):
             i = solution.closed[c]
             for k in range(1, s):
@@ -603,7 +599,7 @@ def fill_column(
         row = change_residual(
             bodies, nodes, tables, slot, state, force, i, solution.pushed[i], row, target, solution
         )
-    for c in range(n_closed if has_place else 0):
+    for c in range(0 if bodies.is_straight else n_closed):
         i = solution.closed[c]
         for k in range(1, s):
             for a in range(n_local):
@@ -625,7 +621,6 @@ def fill_matrix(
     force: Floats,
     n_closed: int,
     blocks: tuple[int, int],
-    has_place: bool,
     solution: Solution,
 ) -> bool:
     """Make the matrix of the equations, and its factors; False where it is singular."""
@@ -659,10 +654,10 @@ def fill_matrix(
                     size, row = solution.direction[i * s + k, f, a], forced[k * n_row + i * n_local + a]
                     add_response(bodies, s, size, row, blocks, listed, change, solution)
                 pushed[i, f, k] = 1.0
-                fill_column(bodies, nodes, tables, slot, state, force, n_closed, has_place, col, solution)
+                fill_column(bodies, nodes, tables, slot, state, force, n_closed, col, solution)
                 pushed[i, f, k] = 0.0
                 col += 1
-    for c in range(n_closed if has_place else 0):
+    for c in range(0 if bodies.is_straight else n_closed):
         i = solution.closed[c]
         for k in range(1, s):
             for b in range(n_local):
@@ -675,7 +670,7 @@ def fill_matrix(
                     if size != 0.0:
                         add_response(bodies, s, size, row, blocks, listed, change, solution)
                 moved[k, i * n_local + b] = 1.0
-                fill_column(bodies, nodes, tables, slot, state, force, n_closed, has_place, col, solution)
+                fill_column(bodies, nodes, tables, slot, state, force, n_closed, col, solution)
                 moved[k, i * n_local + b] = 0.0
                 col += 1
     return factorise(solution.matrix[solution.used[0]], solution.pivot[solution.used[0]], col)
@@ -722,16 +717,14 @@ def code_of(state: Ints) -> int:
 
 
 @linked_sum
-def use_matrix(
-    bodies: Bodies, tables: Tables, slot: int, state: Ints, has_place: bool, solution: Solution
-) -> int:
+def use_matrix(bodies: Bodies, tables: Tables, slot: int, state: Ints, solution: Solution) -> int:
     """Point at the matrix of a length of step and of states, with which it is made unless it was so before.
 
     Of straight gaps several are kept for each length of step: they do not change with the motion.
     """
-    code = 2 * code_of(state) + (1 if has_place else 0)
+    code = code_of(state)
     n_way = solution.states.size // tables.is_filled.size
-    way = code // 2 % n_way if bodies.is_straight else 0
+    way = code % n_way if bodies.is_straight else 0
     used = slot * n_way + way
     if solution.states[used] != code:
         solution.states[used] = 0
@@ -780,8 +773,7 @@ def take_step(
     is that at the solution, for the tangent.
     """
     s, n_local, n_row = nodes.at.size, bodies.n_local, bodies.load.shape[0]
-    has_place = is_exact and not bodies.is_straight
-    n_closed, n_pushed, n = list_closed(bodies, nodes, state, has_place, solution)
+    n_closed, n_pushed, n = list_closed(bodies, nodes, state, solution)
     place, residual, load, states = solution.place, solution.residual, solution.load, solution.states
     is_lean, is_linear = not bodies.is_varied, bodies.is_straight and not bodies.is_varied
     for c in range(n_closed):
@@ -790,7 +782,7 @@ def take_step(
     n_block, free = 2 * s - 1, tables.free[slot]
     used_blocks = (0, s if is_lean else n_block)
     step, forced = tables.tick * 2.0 ** (tables.first_level + slot), tables.forced[slot]
-    code = use_matrix(bodies, tables, slot, state, has_place, solution)
+    code = use_matrix(bodies, tables, slot, state, solution)
     used = solution.used[0]
     see_motions(bodies, x, 2 * n_row, solution)
     listed = (0, n_closed)
@@ -806,15 +798,15 @@ def take_step(
     push_closed(bodies, nodes, state, force, n_closed, solution)
     respond(bodies, s, forced, n_closed, used_blocks, listed, load, solution)
     follow_loads(bodies, nodes, n_closed, solution)
-    last, largest, iteration, n_made, is_solved, is_fresh = np.inf, 0.0, 0, 0, False, False
+    last, largest, iteration, is_solved, is_fresh = np.inf, 0.0, 0, False, False
     while iteration < MOST_ITERATIONS:
         iteration += 1
-        if has_place:
+        if not bodies.is_straight:
             see_gaps(bodies, nodes, n_closed, solution)
-        if has_place or iteration > 1:
+        if not bodies.is_straight or iteration > 1:
             push_closed(bodies, nodes, state, force, n_closed, solution)
             respond(bodies, s, forced, n_closed, used_blocks, listed, load, solution)
-        if not has_place:
+        if bodies.is_straight:
             follow_loads(bodies, nodes, n_closed, solution)
             see_gaps(bodies, nodes, n_closed, solution)
         if is_solved:
@@ -832,19 +824,16 @@ def take_step(
             if is_linear:
                 fill_slopes(bodies, nodes, state, force, n_closed, solution)
                 return iteration
-        fill_residual(bodies, nodes, tables, slot, state, force, n_closed, is_lean, has_place, solution)
+        fill_residual(bodies, nodes, tables, slot, state, force, n_closed, is_lean, solution)
         if states[used] == 0 or is_solved:
             states[used] = 0
-            n_made += 1
-            if not fill_matrix(
-                bodies, nodes, tables, slot, state, force, n_closed, used_blocks, has_place, solution
-            ):
+            if not fill_matrix(bodies, nodes, tables, slot, state, force, n_closed, used_blocks, solution):
                 return -iteration
             states[used], is_fresh = code, True
             solution.noise[used] = noise_of(bodies, nodes, state, n_closed, n_pushed, n, solution)
             if is_solved:
                 return iteration
-            fill_residual(bodies, nodes, tables, slot, state, force, n_closed, is_lean, has_place, solution)
+            fill_residual(bodies, nodes, tables, slot, state, force, n_closed, is_lean, solution)
         solve_factorised(solution.matrix[used], solution.pivot[used], n, residual)
         change, largest, row = 0.0, 0.0, 0
         for r in range(n_pushed):
@@ -860,7 +849,7 @@ def take_step(
                     if f == NORMAL:
                         largest = max(largest, abs(force[i, f, k]))
                 row += s
-        for c in range(n_closed if has_place else 0):
+        for c in range(0 if bodies.is_straight else n_closed):
             first = solution.closed[c] * n_local
             for k in range(1, s):
                 for a in range(n_local):
@@ -868,21 +857,12 @@ def take_step(
                         place[k, first + a] -= residual[row]
                         row += 1
         floor = max(tolerance, solution.noise[used])
-        has_followed = iteration > 1 or bodies.is_straight  # loads have turned with the motion
-        if (
-            is_linear
-            or (has_followed and change <= floor)
-            or (iteration > 1 and change * min(1.0, change / last) <= tolerance)
-        ):
+        if is_linear or change <= floor or (iteration > 1 and change * min(1.0, change / last) <= tolerance):
             is_solved = True
         elif iteration > 3 and change > 0.1 * last and (change < 1e-7 * largest or change < 30.0 * floor):
             is_solved = True  # rounding: no further progress
         elif iteration > 1 and change > SLOW * last and (not is_fresh or iteration > 2):
             states[used] = 0
-            if n_made > 0 and not has_place:  # not the matrix, but the turning loads make it slow
-                has_place = True
-                n_closed, n_pushed, n = list_closed(bodies, nodes, state, has_place, solution)
-                code = use_matrix(bodies, tables, slot, state, has_place, solution)
         last, is_fresh = change, False
     states[used] = 0
     return -iteration

@@ -108,7 +108,7 @@ def carry_step(
     """Carry the columns through a part of a step whose matrix is that at its solution."""
     s, n_local, n_row = nodes.at.size, bodies.n_local, bodies.load.shape[0]
     has_place = not bodies.is_straight
-    n_closed, _, n = list_closed(bodies, nodes, state, has_place, solution)
+    n_closed, _, n = list_closed(bodies, nodes, state, solution)
     step, n_x = tables.tick * 2.0 ** (tables.first_level + slot), trail.column.size
     blocks, listed = (0, 2 * s - 1), (0, n_closed)
     change, moved, begun, pushed = solution.change, solution.moved, solution.begun, solution.pushed
