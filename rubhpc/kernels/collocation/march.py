@@ -516,7 +516,7 @@ def advance_by_collocation(
             if not tables.is_filled[slot]:
                 fill_step(bodies, nodes, tables, slot)
             step = tables.tick * 2.0 ** (tables.first_level + slot)
-            is_exact = trail is not None and todo == STEPPING
+            is_exact = trail is not None and trail.columns.shape[1] > 0 and todo == STEPPING
             is_whole = is_recorded or bodies.is_sticky or is_exact or state.size > 1
             n_iteration = take_step(
                 bodies,
@@ -582,7 +582,7 @@ def advance_by_collocation(
                     case.force,
                     solution.guess,
                     is_continued,
-                    solution.noise[slot],
+                    solution.noise[solution.used[0]],
                     solution,
                 )
                 error *= min(1.0, step / AVERAGED)
