@@ -11,7 +11,7 @@ the rest alternates. The error is proportional to the square of the length of pi
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -27,17 +27,19 @@ from rubhpc.integrate.start import start_of
 from rubhpc.study.initial import CONTACT_FREE, Initial
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
     from rubhpc.integrate.changing_speed.passing import Ended
+    from rubhpc.integrate.changing_speed.pieces import Block
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.kernels.accumulators import Accumulator
     from rubhpc.study.speed_law import SpeedLaw
 
     Floats = NDArray[np.float64]
+    Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -108,13 +110,13 @@ def integrate_run_up(
         Called with the share of the revolutions that is done.
     """
     model, per_revolution = fastest.model, fastest.samples_per_revolution
-    pieces, passing = Pieces(fastest), Passing(clearance, friction, check, say)
-    cuts = pieces.ripples.cut(law, per_revolution, pieces_per_revolution)
     n_stator, n = len(model.stators), law.n_revolution
+    begins, _, _ = law.at_angle(2.0 * np.pi * np.arange(n + 1))
+    parts = _through_releases(fastest, law, begins, pieces_per_revolution)
+    cuts = np.concatenate([part.cuts[:-1] for part in parts] + [parts[-1].cuts[-1:]])
     angles = 2.0 * np.pi / per_revolution * cuts.astype(np.float64)
     times, at_cuts, _ = law.at_angle(angles)
     _, _, accelerations = law.at_angle(0.5 * (angles[1:] + angles[:-1]))
-    begins, _, _ = law.at_angle(2.0 * np.pi * np.arange(n + 1))
     whole = empty_samples(model.n_place, n * per_revolution, model.n_probe, model.n_push).whole
     gathered = Turns(n, model)
     reached: State | Place | None = initial if isinstance(initial, State) else None
@@ -133,11 +135,19 @@ def integrate_run_up(
     late[bent] = ((speeds - 0.5 * (at_cuts[1:] + at_cuts[:-1])) * durations)[bent]
     is_even = sizes > 1  # pieces of one sample are around a bend
     lag = (accelerations * durations**2 / 12.0)[is_even]
-    advice = pieces.ripples.advice(speeds[is_even], sizes[is_even] / per_revolution, lag, signal_names(model))
+    ripples = parts[-1].pieces.ripples
+    advice = ripples.advice(speeds[is_even], sizes[is_even] / per_revolution, lag, signal_names(model))
     unit, none = unit_rotation(model.rotor), np.zeros(model.rotor.n_dof)
     piece = 0
     ended: Ended | None = None  # the last piece
-    for block in pieces.blocks(speeds, accelerations, angles[:-1], durations, sizes):
+    passing = Passing(clearance, friction, check, say)
+    if len(parts[0].cuts) == 1 and isinstance(initial, Initial):  # bearings let go before the first piece
+        at_first = (float(column[0]) for column in (speeds, accelerations, angles, durations))
+        reached = start_of(initial, parts[0].pieces.setup(*at_first), clearance, law.speed[0])
+    of_pieces = speeds, accelerations, angles[:-1], durations, sizes
+    for block, is_released in _blocks(parts, of_pieces):
+        if is_released and reached is not None:
+            reached, ended, passing = state_at(reached, setup), None, passing.anew()
         setup, size, begins_at = block[0], int(sizes[piece]), piece
         if setup.model is not sagging:
             lift_samples(whole[:, begun : cuts[piece]], sagging)
@@ -222,6 +232,43 @@ def integrate_run_up(
         final=state_at(reached, setup),
         advice=advice,
     )
+
+
+class _Part(NamedTuple):
+    """Part of a run-up up to where bearings let go of the shaft."""
+
+    pieces: Pieces
+    cuts: Ints  # samples between which its pieces lie
+
+
+def _through_releases(
+    fastest: ModalSetup, law: SpeedLaw, begins: Floats, pieces_per_revolution: int | None
+) -> list[_Part]:
+    """Return the parts of a run-up whose revolutions begin at times, s; the first one may have no piece."""
+    parts: list[_Part] = []
+    setup, done, per_revolution = fastest, 0, fastest.samples_per_revolution
+    while True:
+        release = setup.release
+        end = begins.size - 1 if release is None else release.turn(begins)
+        if end > done or not parts:
+            pieces, ends = Pieces(setup), np.array([done, end]) * per_revolution
+            cuts = pieces.ripples.cut(law, per_revolution, pieces_per_revolution)
+            within = cuts[(cuts > ends[0]) & (cuts < ends[1])]
+            parts.append(_Part(pieces, np.union1d(within, ends)))
+        if release is None or end == begins.size - 1:
+            return parts
+        setup, done = release.setup, end
+
+
+def _blocks(parts: list[_Part], of_pieces: tuple[Any, ...]) -> Iterator[tuple[Block, bool]]:
+    """Blocks of all parts, and whether bearings have let go before; columns as of `Pieces.blocks`."""
+    piece = 0
+    for i, part in enumerate(parts):
+        end = piece + part.cuts.size - 1
+        blocks = part.pieces.blocks(*(column[piece:end] for column in of_pieces))
+        for n_block, block in enumerate(blocks):
+            yield block, i > 0 and n_block == 0
+        piece = end
 
 
 def is_contact_free(initial: Initial, begun: State) -> bool:

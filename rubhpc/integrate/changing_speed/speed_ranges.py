@@ -17,6 +17,7 @@ from rubhpc.integrate.changing_speed.piece_setup import HeldMatrices, PieceSetup
 from rubhpc.integrate.changing_speed.range_library import speeds_of
 from rubhpc.integrate.changing_speed.ripples import Linear
 from rubhpc.integrate.packing import whole_system
+from rubhpc.integrate.reduced_model.reduction import reduced_sag
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -158,6 +159,8 @@ class SpeedRanges:
         )
         for name in ("translations", "project"):  # which need not be computed again
             reduced.__dict__[name] = getattr(fastest.reduced, name)
+        if model.rotor.softness:
+            model = sagging(model, reduced_sag(model, reduced), model.film)
         return model, reduced
 
     def _reach(

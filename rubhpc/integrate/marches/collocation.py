@@ -117,6 +117,7 @@ class CollocationMarch(ModalMarch):
         self.n_step, self.sample, self._stride = 0, 0, ALL_SAMPLES
         self._take(setup)
         self._motion[:] = self.moved(setup, place)
+        shortest = self._modes.tables.first_level
         self._use_modes(setup)
         self._begin(place.contact_force)
         if place.contacts is not None:
@@ -125,8 +126,10 @@ class CollocationMarch(ModalMarch):
             self._case.lasting[:] = contacts.lasting
             self._case.since[:] = -np.round(contacts.age / self.clock.tick).astype(np.int64)
             self._memory["is_new"] = 0
-            for name in ("slot", "scale", "fastest", "unseen"):
+            for name in ("scale", "fastest", "unseen"):
                 self._memory[name] = contacts.memory[name]
+            slot = contacts.memory["slot"] + shortest - self._modes.tables.first_level
+            self._memory["slot"] = np.clip(slot, 0, self._modes.tables.is_filled.size - 1)
 
     def reached(self) -> Place:
         """Present motion and contacts, for another speed to continue from."""
@@ -331,7 +334,7 @@ class CollocationMarch(ModalMarch):
     def _new_seen(self, samples: Samples, accumulator: Accumulator) -> Seen:
         signals, s = self._modes.signals, self._modes.nodes.at.size
         measured = Measured(self._recorder, samples, accumulator)
-        if self._seen is not None:
+        if self._seen is not None and self._seen.read.size == signals.free.shape[1]:
             return self._seen._replace(measured=measured)
         n_x = self._case.x.size
         return Seen(
