@@ -186,6 +186,8 @@ class CollocationMarch(ModalMarch):
         own, self.accuracy = self.accuracy, accuracy or self.accuracy
         trail = self.new_trail(columns, n_event)
         self.trail, (samples, accumulator) = trail, self._idle
+        longest = self._modes.tangent_tables.is_filled.size - 1
+        self._memory["slot"] = np.minimum(self._memory["slot"], longest)
         outcome = PAUSED
         while outcome == PAUSED and not trail.count[TOO_MANY]:
             outcome = self._kernel(last_tick, samples, accumulator, False)
@@ -355,7 +357,7 @@ class CollocationMarch(ModalMarch):
         return advance_by_collocation(
             self._contacts,
             modes.nodes,
-            modes.tables,
+            modes.tables if self.trail is None else modes.tangent_tables,
             modes.signals,
             modes.power,
             self.clock,
