@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from rubhpc.case_arguments import CaseArguments, case_of, check_count, read_keep
-from rubhpc.errors import InputError, NoPeriodicMotion
+from rubhpc.errors import InputError, NoPeriodicMotion, located
 from rubhpc.input.messages import brief
 from rubhpc.input.quantity import parse_quantity
 from rubhpc.integrate.branches.branch import branch_of
@@ -195,10 +195,8 @@ def _one(rig: Rig, along: str, value: float | str, name: str) -> float:
             f'branch: along: {brief(along)} is not the name of an axis; give one, such as "friction"'
         )
     check_followed(along, "branch: along")
-    try:
+    with located("branch: along: "):
         unit = unit_of(along, rig)
-    except InputError as error:
-        raise InputError(f"branch: along: {error}") from None
     found = parse_quantity(value, unit, f"branch: {name}")
     if not math.isfinite(found):
         raise InputError(f"branch: {name}: {value} is not a number")

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields, replace
 from numbers import Integral
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
-from rubhpc.errors import InputError
+from rubhpc.errors import InputError, located
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
 from rubhpc.fem.stability import instability_message
@@ -238,8 +238,6 @@ def _read_initial(caller: str, initial: object) -> State | Initial:
         problem = "is neither a State nor a dict"
         raise InputError(f"{caller}: initial: {brief(initial)} {problem}; give a record's `final`")
     start = build(Initial, initial, caller, "initial")
-    try:
+    with located(f"{caller}: "):
         check_initials(start, [])
         return with_state(start) if start.is_from_store else start
-    except InputError as error:
-        raise InputError(f"{caller}: {error}") from None

@@ -35,6 +35,15 @@ def writing(path: Path, option: str = "") -> Iterator[None]:
         raise InputError(f"{path}: cannot be written: {reason_of(error, path)}; {remedy}") from error
 
 
+@contextmanager
+def located(where: str) -> Iterator[None]:
+    """Put what comes before "[table] key" of a message before those of InputErrors, "study.toml: "."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{where}{error}") from None
+
+
 def lacks_inodes(error: OSError, path: Path) -> bool:
     """Whether a disk is full of files, not of bytes."""
     if error.errno != errno.ENOSPC:

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rubhpc.case_arguments import CaseArguments, case_of, read_probes
-from rubhpc.errors import InputError
+from rubhpc.errors import InputError, located
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.free_spin import release
-from rubhpc.input.fields import FieldError
 from rubhpc.input.quantity import parse_quantity
 from rubhpc.input.reading import build, plain
 from rubhpc.integrate.changing_speed.case import by_revolution
@@ -28,6 +27,7 @@ from rubhpc.schema import (
     TURNED,
     VARIABLES,
     bore_variables,
+    described,
     drive_variables,
     probe_variables,
     run_up_variables,
@@ -154,18 +154,18 @@ def run_up(
     signals = by_name(found.whole, one.setup.model)
     known = VARIABLES | bore_variables() | probe_variables((probe.name, probe.quantity) for probe in measured)
     variables: dict[str, Any] = {
-        name: (known[name].dims, values, _about(known[name].unit, known[name].long_name))
+        name: (known[name].dims, values, described(known[name].unit, known[name].long_name))
         for name, values in signals.items()
     }
     variables["minimum_slip_speed"] = (
         ("stator",),
         np.where(np.isfinite(slip := found.together.least_slip), slip, np.nan),
-        _about("m s-1", VARIABLES["minimum_slip_speed"].long_name),
+        described("m s-1", VARIABLES["minimum_slip_speed"].long_name),
     )
     own = drive_variables() | run_up_variables((probe.name, probe.quantity) for probe in measured)
     for name, values in by_revolution(found, signals, samples_per_revolution).items():
         short = name if name.startswith((AMPLITUDE, PHASE)) else name.removeprefix("revolution_")
-        variables[short] = own[name].dims, values, _about(own[name].unit, own[name].long_name)
+        variables[short] = own[name].dims, values, described(own[name].unit, own[name].long_name)
     attributes: dict[str, Any] = {
         "reason": found.reason,
         "note": "; ".join(text for text in (one.note, found.advice) if text),
@@ -179,8 +179,8 @@ def run_up(
             "energy_residual": found.energy_residual,
         }
     settings = {
-        "clearance": ((), one.clearance, _about("m", VARIABLES["clearance"].long_name)),
-        "friction": ((), one.friction, _about("1", "friction coefficient")),
+        "clearance": ((), one.clearance, described("m", VARIABLES["clearance"].long_name)),
+        "friction": ((), one.friction, described("1", "friction coefficient")),
     }
     passage = _dataset(variables, len(found.speed), samples_per_revolution, attributes)
     return passage.assign_coords(settings)
@@ -188,10 +188,9 @@ def run_up(
 
 def _read_drive(drive: Mapping[str, object]) -> DriveLaw:
     """The drive from the keys of its table."""
-    try:
-        return build(DriveKeys, drive, "run_up", "drive").law_at({})
-    except FieldError as error:
-        raise InputError(f"run_up: drive: {error}") from None
+    keys = build(DriveKeys, drive, "run_up", "drive")
+    with located("run_up: drive: "):
+        return keys.law_at({})
 
 
 def _highest(law: SpeedLaw | DriveLaw, rig: Rig | str | PathLike[str], overrides: Any) -> float:
@@ -227,10 +226,6 @@ def _read_law(
         raise InputError(f"run_up: {error}") from None
 
 
-def _about(unit: str, long_name: str) -> dict[str, str]:
-    return {"units": unit, "long_name": long_name}
-
-
 def _dataset(
     variables: dict[str, Any], n_turn: int, per_revolution: int, attributes: dict[str, Any]
 ) -> xr.Dataset:
@@ -243,15 +238,15 @@ def _dataset(
             TURNED: (
                 "sample",
                 np.arange(n_turn * per_revolution) / per_revolution,
-                _about("1", "revolutions turned"),
+                described("1", "revolutions turned"),
             ),
             "revolution": (
                 "revolution",
                 np.arange(n_turn),
-                _about("1", "number of the revolution, from 0"),
+                described("1", "number of the revolution, from 0"),
             ),
-            "order": ("order", np.array(ORDERS), _about("1", "order of the spin frequency")),
-            "stator": ("stator", np.arange(1, n_stator + 1), _about("1", "number of the stator")),
+            "order": ("order", np.array(ORDERS), described("1", "order of the spin frequency")),
+            "stator": ("stator", np.arange(1, n_stator + 1), described("1", "number of the stator")),
         },
     )
     found.attrs |= attributes

@@ -339,6 +339,11 @@ def role_of(name: str) -> str:
     return next((role for prefix, (role, *_) in _OF_PROBES.items() if name.startswith(prefix)), "")
 
 
+def described(unit: str, long_name: str = "") -> dict[str, str]:
+    """Return what a dataset says of a variable."""
+    return {"units": unit} | ({"long_name": long_name} if long_name else {})
+
+
 def is_signal(name: str) -> bool:
     """Whether a name is that of a recorded signal, also of a probe."""
     return name in SIGNAL_NAMES or name in bore_variables() or name.startswith(PROBE)

@@ -30,8 +30,6 @@ SLOW = (
     "datasets/test_dataset.py::test_equal_arguments_give_equal_bytes_and_a_case_does_not_depend_on_others",
     "datasets/test_dataset.py::test_windows_of_run_ups_have_labels_of_their_own",
     "faults/",
-    "fem/test_campbell.py::test_critical_speed_of_another_order",
-    "fem/test_campbell.py::test_critical_speeds_solve_the_synchronous_problem",
     "fem/test_critical_speeds.py",
     "fem/test_shaft_parts.py::test_schemes_agree",
     "fem/test_linear_design.py::test_tables_set_the_range_and_the_sag",

@@ -10,18 +10,14 @@ from postproc.store.units import displayed, meanings, plain_number
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
     from matplotlib.ticker import Locator
+    from matplotlib.transforms import Transform
     from numpy.typing import NDArray
 
 _MOST_TICKS = 40  # along a side of a map
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.transforms import Transform
-    from numpy.typing import NDArray
 MOST = 10  # values; an axis of more has round ticks
 _CHARACTER, _GAP, _LINE = 1.5, 1.5, 3.6  # mm, of labels of 8 pt
 _DEGREES = (1, 2, 5, 10, 15, 30, 45)  # between ticks of a phase

@@ -98,10 +98,9 @@ def energy_time_frequency(
     ax: Axes,
     limit: float | None = None,
     natural: Mapping[str, float] | None = None,
-    mode: int = 1,
     colorbar: bool = True,
 ) -> Axes:
-    """Draw the energy of an intrinsic mode over time and frequency; contact is shaded.
+    """Draw the energy of the first intrinsic mode over time and frequency; contact is shaded.
 
     Parameters
     ----------
@@ -112,7 +111,7 @@ def energy_time_frequency(
     colorbar : bool
         Whether a colour bar is drawn next to `ax`.
     """
-    mesh = _draw_energy(hht, ax, limit, natural or {}, mode)
+    mesh = _draw_energy(hht, ax, limit, natural or {}, 1)
     if colorbar:
         _add_bar(ax, [ax], mesh)
     return ax

@@ -49,7 +49,7 @@ _CRITICAL: dict[str, Any] = {
 
 
 def campbell_diagram(
-    curves: xr.Dataset, ax: Axes, critical: Sequence[tuple[int, float]] = (), limit: float | None = None
+    curves: xr.Dataset, ax: Axes, critical: Sequence[float] = (), limit: float | None = None
 ) -> Axes:
     """Draw the Campbell diagram: lateral modes by their whirl, torsional and axial ones, 1X and 2X.
 
@@ -58,7 +58,7 @@ def campbell_diagram(
     curves : xarray.Dataset
         `frequency` (Hz), `damping_ratio` and `whirl` over (mode, speed), with the coordinates `kind` and
         `speed` (rad/s).
-    critical : sequence of (mode, speed)
+    critical : sequence of float
         Critical speeds, rad/s, to be marked on the 1X line.
     limit : float, optional
         End of the ordinate, Hz; by default just above the highest curve.
@@ -82,7 +82,7 @@ def campbell_diagram(
     for order in ORDERS:
         _draw_order(ax, order)
     if critical:
-        speeds = np.array([speed for _, speed in critical])
+        speeds = np.asarray(critical)
         ax.plot(30 / math.pi * speeds, speeds / (2 * math.pi), **_CRITICAL)
         _number(ax, speeds)
     ax.set(xlabel="Spin speed (rpm)", ylabel="Natural frequency (Hz)")

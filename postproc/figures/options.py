@@ -82,15 +82,15 @@ def hertz(value: float | str, option: str) -> float:
     return _above_zero(value, "Hz", option)
 
 
-def end_of_abscissa(value: float | str | None, orders: bool, option: str = "--max") -> float | None:
+def end_of_abscissa(value: float | str | None, orders: bool) -> float | None:
     """Return the end of an abscissa, Hz or `orders` of the spin speed; None of none.
 
     Raises
     ------
     InputError
-        It is not a frequency, or no number of orders, or not above 0; `option` names it.
+        It is not a frequency, or no number of orders, or not above 0.
     """
-    return None if value is None else _above_zero(value, "" if orders else "Hz", option)
+    return None if value is None else _above_zero(value, "" if orders else "Hz", "--max")
 
 
 def spin_speed(value: float | str, option: str) -> float:

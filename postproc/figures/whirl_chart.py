@@ -76,7 +76,7 @@ def _draw_friction(ax: Axes, found: xr.Dataset, i: int, along: str) -> None:
     """Draw the friction above which whirl exists, and the one at which it begins in each range."""
     x, label = _abscissa(found, along)
     lines = found["least_friction"].isel(stator=i).transpose(along, ...).values.reshape(x.size, -1)
-    _, top = _limits(found, lines)
+    top = _most_friction(found, lines)
     shaded, least = _outline(x, np.minimum(lines.min(axis=1), top), top)
     ax.fill_between(shaded, least, **_SAFE)
     some = _select(found, "threshold", i)
@@ -182,7 +182,7 @@ def _draw_curve(ax: Axes, found: xr.Dataset, i: int) -> None:
             chosen &= is_full == full
             at = some["whirl_frequency"].values[chosen] / (2 * math.pi)
             ax.plot(at, some["whirl_friction"].values[chosen], **_mark(word, f"C{k}", fill))
-    top = _limits(found, needed)[1]
+    top = _most_friction(found, needed)
     shown = hertz[needed < top]
     ax.set(xlabel="Whirl frequency (Hz), forward positive", ylabel="Friction needed", ylim=(0.0, top))
     if shown.size:
@@ -254,11 +254,11 @@ def _write_none(ax: Axes) -> None:
     ax.text(0.5, 0.5, "no dry whirl", transform=ax.transAxes, ha="center", va="center", fontsize=7)
 
 
-def _limits(found: xr.Dataset, needed: Floats) -> tuple[float, float]:
-    """Ends of an axis of friction: up to that of cases, and beyond the least that is needed."""
+def _most_friction(found: xr.Dataset, needed: Floats) -> float:
+    """End of an axis of friction: up to that of cases, and beyond the least that is needed."""
     there = needed[np.isfinite(needed)]
     least, most = (float(there.min()), min(float(there.max()), 1.0)) if there.size else (0.0, 0.0)
-    return 0.0, 1.1 * max([*found.attrs["frictions"], 1.2 * least, most]) or 1.0
+    return 1.1 * max([*found.attrs["frictions"], 1.2 * least, most]) or 1.0
 
 
 def _is_stable(some: xr.Dataset) -> NDArray[np.bool_]:

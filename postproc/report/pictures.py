@@ -214,12 +214,10 @@ def _facts(table: str) -> dict[str, Any]:
 
 
 def _diagram(design: xr.Dataset) -> str:
-    speeds, modes = design["critical_speed"].values, design["critical_mode"].values
-    critical = [(int(mode), float(speed)) for mode, speed in zip(modes, speeds, strict=True)]
     limit = 1.5 * float(design["speed"].values[-1]) / (2 * math.pi)
     content = io.BytesIO()
     with house_style():
         figure, (ax,) = new_figure(height=80, width=120)
-        campbell_diagram(design, ax, critical, limit)
+        campbell_diagram(design, ax, design["critical_speed"].values.tolist(), limit)
         figure.savefig(content, format="svg", metadata={"Date": None})
     return "data:image/svg+xml;base64," + base64.b64encode(content.getvalue()).decode()

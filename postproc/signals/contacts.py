@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 _BEFORE, _AFTER = 5, 3  # samples that a jump is extrapolated from, and those it is held against
+_ABOVE = 10.0  # of the median, where a signal alone shows an event
 _LEAST = 8  # samples of a span from which a decay is read
 
 
@@ -144,14 +145,11 @@ def event_jumps(
 
 
 def events_in_signal(
-    case: xr.Dataset,
-    signal: str = "torsion_acceleration",
-    stator: int | None = None,
-    threshold: float = 10.0,
+    case: xr.Dataset, signal: str = "torsion_acceleration", stator: int | None = None
 ) -> xr.Dataset:
     """Return where a signal jumps, found from the signal alone, as on a test rig without a force sensor.
 
-    An event is where the departure (see `event_jumps`) peaks above `threshold` times its median over the
+    An event is where the departure (see `event_jumps`) peaks above ten times its median over the
     revolution. Its time is known to within four samples.
 
     Returns
@@ -165,7 +163,7 @@ def events_in_signal(
     departure = np.nan_to_num(_departures(wave.values))
     medians = np.median(departure.reshape(-1, samples_per_revolution(wave)), axis=1)
     level = np.repeat(medians, samples_per_revolution(wave))
-    places, _ = find_peaks(departure, height=threshold * level, distance=_BEFORE)
+    places, _ = find_peaks(departure, height=_ABOVE * level, distance=_BEFORE)
     jump = departure[places]
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = jump / level[places]

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 SPIKE = 0.004  # half width of a spike, as a part of the abscissa
+_LEAST = 0.02  # of the highest line, below which none counts
 _EXACT = 1e-6  # orders
 _CLOSE = 0.01  # of a frequency, up to which a natural one is near
 _NAMED = 0.25  # lines between the order of a sine and the one that it is named by, at most
@@ -88,19 +89,18 @@ def spikes(
 def strongest_lines(
     spectrum: xr.DataArray,
     n_line: int = 6,
-    threshold: float = 0.02,
     natural: Mapping[str, Sequence[float]] | None = None,
     digits: int = 3,
 ) -> xr.Dataset:
     """Return the strongest local maxima of a spectrum, strongest first, with their names.
+
+    None is below a fiftieth of the highest.
 
     Parameters
     ----------
     spectrum : (order,)
         One case; the mean (order 0) is no line. Its coordinate `period` (revolutions, `proven_period`) allows
         fractions: without it, or where it is 0, only multiples of the spin speed are named.
-    threshold : float
-        Lines below this fraction of the strongest are left out.
     natural : mapping of kind to frequencies in Hz, optional
         Natural frequencies; the spectrum then needs the coordinate `frequency`.
     digits : int
@@ -119,7 +119,7 @@ def strongest_lines(
     amplitude = np.where(np.abs(order) < 1e-9, 0.0, amplitude)
     padded = np.concatenate(([0.0], amplitude, [0.0]))
     is_peak = (amplitude > padded[:-2]) & (amplitude >= padded[2:])
-    is_peak &= amplitude >= threshold * amplitude.max(initial=0.0)
+    is_peak &= amplitude >= _LEAST * amplitude.max(initial=0.0)
     peaks = np.flatnonzero(is_peak)
     peaks = peaks[np.argsort(-amplitude[peaks], kind="stable")][:n_line]
     period = max(int(spectrum.coords["period"]), 1) if "period" in spectrum.coords else 1

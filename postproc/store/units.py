@@ -105,14 +105,14 @@ _CAPTION_WIDTH = 56  # characters that a column takes
 _MARKUP = re.compile(r"[$\\_]")  # of symbols, which takes no room
 
 
-def scale_of(data: xr.DataArray, unit: str | None = None) -> Scale:
+def scale_of(data: xr.DataArray) -> Scale:
     """Return the scale that suits the largest finite magnitude in `data`; speeds are read in rpm."""
-    if data.name in _SPEEDS and unit is None:
+    if data.name in _SPEEDS:
         return RPM
     values = np.abs(np.asarray(data.values, dtype=float))
     finite = values[np.isfinite(values)]
     size = float(finite.max()) if finite.size else 0.0
-    return scale_for(str(data.attrs.get("units", "1")) if unit is None else unit, size)
+    return scale_for(str(data.attrs.get("units", "1")), size)
 
 
 def displayed(data: xr.DataArray) -> tuple[NDArray[np.float64], str]:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
+from rubhpc.commands.options import SEED, STUDY, TRUST_STUDY, WORKERS
+
 
 @click.command()
-@click.argument("study", metavar="STUDY.toml", type=click.Path(path_type=Path))
+@STUDY
 @click.option(
     "--output", type=click.Path(path_type=Path), metavar="DIR", help="[default: STUDY_calibrated here]"
 )
@@ -25,6 +28,7 @@ import click
 )
 @click.option(
     "--signal",
+    "signals",
     multiple=True,
     default=("vertical", "horizontal", "torsion"),
     show_default=True,
@@ -42,26 +46,11 @@ import click
     "--revolutions", type=click.IntRange(min=26), default=32, show_default=True, help="That are measured."
 )
 @click.option("--live", type=click.IntRange(min=10), default=50, show_default=True, help="Live points.")
-@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True)
-@click.option(
-    "--workers", type=click.IntRange(min=1), default=1, show_default=True, help="Processes of this machine."
-)
-@click.option(
-    "--trust-rig", is_flag=True, help='Run the Python code of a study whose rig is "FILE.py:FUNCTION".'
-)
+@SEED
+@WORKERS
+@TRUST_STUDY
 def calibrate(
-    study: Path,
-    output: Path | None,
-    posteriors: int,
-    noise: tuple[float, ...],
-    signal: tuple[str, ...],
-    method: str,
-    transient: int,
-    revolutions: int,
-    live: int,
-    seed: int,
-    workers: int,
-    trust_rig: bool,
+    study: Path, output: Path | None, posteriors: int, noise: tuple[float, ...], workers: int, **keys: Any
 ) -> int:
     """Test identification on records whose truth is known.
 
@@ -76,19 +65,7 @@ def calibrate(
 
     folder = output or Path(f"{study.stem}_calibrated")
     trials = [
-        Trial(
-            study=str(study),
-            noise=level,
-            draw=draw,
-            signals=signal,
-            method=method,
-            transient=transient,
-            revolutions=revolutions,
-            live=live,
-            seed=seed,
-            output=str(folder),
-            trust_rig=trust_rig,
-        )
+        Trial(study=str(study), noise=level, draw=draw, output=str(folder), **keys)
         for draw in range(posteriors)
         for level in noise
     ]

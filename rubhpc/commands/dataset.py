@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from rubhpc.commands.quantity import quantity
+from rubhpc.commands.options import quantity
 from rubhpc.commands.selection import SELECT, open_cases
 
 _COUNT: dict[str, Any] = {"show_default": True, "type": click.IntRange(min=1), "metavar": "N"}

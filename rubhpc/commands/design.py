@@ -7,10 +7,20 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from rubhpc.commands.options import plain_number
+
 if TYPE_CHECKING:
     import xarray as xr
 
 _RPM = 30 / math.pi
+_OF_CRITICAL = (
+    *("critical_speed", "critical_mode", "critical_whirl", "critical_damping_ratio"),
+    "is_excited",
+)
+_OF_PEAK = (
+    *("peak_speed", "peak_amplitude", "peak_node", "lower_half_power_speed", "upper_half_power_speed"),
+    *("amplification_factor", "separation_margin", "required_margin", "is_separated"),
+)
 
 
 def print_design(design: xr.Dataset) -> None:
@@ -44,33 +54,6 @@ def print_design(design: xr.Dataset) -> None:
 
 def plain_design(design: xr.Dataset, nodes: list[int]) -> dict[str, Any]:
     """Return a linear design for JSON, SI units; the response at some nodes."""
-    critical = [
-        {
-            "speed": float(one["critical_speed"]),
-            "mode": int(one["critical_mode"]),
-            "whirl": one["critical_whirl"].item(),
-            "damping_ratio": float(one["critical_damping_ratio"]),
-            "is_excited": bool(one["is_excited"]),
-        }
-        for one in (design.isel(critical=i) for i in range(design.sizes["critical"]))
-    ]
-    names = ("speed", "amplitude", "node")
-    keys = {f"peak_{name}": name for name in names} | {
-        name: name
-        for name in (
-            "lower_half_power_speed",
-            "upper_half_power_speed",
-            "amplification_factor",
-            "separation_margin",
-            "required_margin",
-            "is_separated",
-        )
-        if name in design
-    }
-    peaks = [
-        {name: _number(design[key].values[i]) for key, name in keys.items()}
-        for i in range(design.sizes["peak"])
-    ]
     sag = design.isel(speed=0)
     response = [
         {
@@ -82,7 +65,7 @@ def plain_design(design: xr.Dataset, nodes: list[int]) -> dict[str, Any]:
                 {
                     "angle": float(angle),
                     "amplitude": design["amplitude"].sel(node=node, probe=angle).values.tolist(),
-                    "phase": [_number(v) for v in design["phase"].sel(node=node, probe=angle).values],
+                    "phase": plain_number(design["phase"].sel(node=node, probe=angle).values.tolist()),
                 }
                 for angle in design["probe"].values
             ],
@@ -92,17 +75,25 @@ def plain_design(design: xr.Dataset, nodes: list[int]) -> dict[str, Any]:
     return {
         "speed_range": design.attrs["speed_range"],
         "operating": design.attrs.get("operating"),
-        "critical_speeds": critical,
-        "peaks": peaks,
+        "critical_speeds": _listed(design, "critical", _OF_CRITICAL),
+        "peaks": _listed(design, "peak", _OF_PEAK),
         "static_sag": [
             {"node": int(node), "vertical": float(v), "horizontal": float(w)}
             for node, v, w in zip(
                 sag["node"].values, sag["sag_vertical"].values, sag["sag_horizontal"].values, strict=True
             )
         ],
-        "threshold_speed": _number(design["threshold_speed"].values),
+        "threshold_speed": plain_number(design["threshold_speed"].item()),
         "response": response,
     }
+
+
+def _listed(design: xr.Dataset, dim: str, names: tuple[str, ...]) -> list[dict[str, Any]]:
+    """What is known of each critical speed or peak, under names without that of the dimension."""
+    columns = {
+        n.removeprefix(f"{dim}_"): plain_number(design[n].values.tolist()) for n in names if n in design
+    }
+    return [{name: values[i] for name, values in columns.items()} for i in range(design.sizes[dim])]
 
 
 def _print_peaks(design: xr.Dataset) -> None:
@@ -158,9 +149,3 @@ def _least(design: xr.Dataset) -> str:
 
 def _decrement(ratio: float) -> float:
     return 2 * math.pi * ratio / math.sqrt(1.0 - ratio**2)
-
-
-def _number(value: Any) -> Any:
-    """A number for JSON, None where it is none."""
-    plain = value.item()
-    return None if isinstance(plain, float) and not math.isfinite(plain) else plain

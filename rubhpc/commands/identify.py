@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
+
+from rubhpc.commands.options import SEED, STUDY, TRUST_STUDY, WORKERS
 
 
 @click.command()
 @click.argument("measured", metavar="MEASURED.toml", type=click.Path(path_type=Path))
-@click.argument("study", metavar="STUDY.toml", type=click.Path(path_type=Path))
+@STUDY
 @click.option(
     "--output", type=click.Path(path_type=Path), metavar="DIR", help="[default: MEASURED_identified here]"
 )
@@ -23,24 +26,18 @@ import click
 @click.option(
     "--draws", type=click.IntRange(min=1), default=1000, show_default=True, help="Of the posterior."
 )
-@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True)
+@SEED
 @click.option("--slack", is_flag=True, help="Try slack bearings too, which takes several times as long.")
-@click.option(
-    "--workers", type=click.IntRange(min=1), default=1, show_default=True, help="Processes of this machine."
-)
-@click.option(
-    "--trust-rig", is_flag=True, help='Run the Python code of a study whose rig is "FILE.py:FUNCTION".'
-)
+@WORKERS
+@TRUST_STUDY
 def identify(
     measured: Path,
     study: Path,
     output: Path | None,
-    live: int,
-    draws: int,
-    seed: int,
     slack: bool,
     workers: int,
     trust_rig: bool,
+    **sampling: Any,
 ) -> int:
     """Find the rub behind a measured vibration, and how sure that is.
 
@@ -64,10 +61,8 @@ def identify(
             pool,
             lambda: read_problem(measured, study, slack=slack, trust_rig=trust_rig),
             output=folder,
-            live=live,
-            draws=draws,
-            seed=seed,
             report=say,
+            **sampling,
         )
     for line in found.lines:
         click.echo(line)

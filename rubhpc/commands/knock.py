@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 import time
-from pathlib import Path
+from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from rubhpc.commands.quantity import quantity
-from rubhpc.errors import InputError
+from rubhpc.commands.options import STUDY, TRUST_STUDY, WORKERS, quantity
 from rubhpc.running.launch import launch
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
 _GAP = 10.0  # s between lines that report the progress
 
 
 @click.command()
-@click.argument("study", metavar="STUDY.toml", type=click.Path(path_type=Path))
+@STUDY
 @click.option("--angles", type=click.IntRange(min=1), default=12, show_default=True, help="Directions tried.")
 @click.option(
     "--node", "nodes", type=int, multiple=True, help="Node that is knocked [default: the output node]."
@@ -32,24 +32,18 @@ _GAP = 10.0  # s between lines that report the progress
     show_default=True,
     help="Relative width of the interval of the least impulse.",
 )
-@click.option(
-    "--workers", type=click.IntRange(min=1), default=1, show_default=True, help="Processes of this machine."
-)
+@WORKERS
 @click.option("--figure", metavar="FILE", help=".png, .pdf or .svg [default: STUDY_knock.png here]")
 @click.option("--data", metavar="FILE", help="Write the data too: .csv, .json, .zarr or .nc.")
-@click.option(
-    "--trust-rig", is_flag=True, help='Run the Python code of a study whose rig is "FILE.py:FUNCTION".'
-)
+@TRUST_STUDY
 def knock(
     study: Path,
-    angles: int,
-    nodes: tuple[int, ...],
     most: str | None,
-    tolerance: float,
     workers: int,
     figure: str | None,
     data: str | None,
     trust_rig: bool,
+    **search: Any,
 ) -> int:
     """Find the least knock that takes a machine from its contact-free motion to sustained rub.
 
@@ -62,23 +56,18 @@ def knock(
     from postproc.figures.resilience_curve import resilience
     from postproc.store.export import check_data_path, write_data
     from rubhpc.knock_cases import Progress
-    from rubhpc.knocks import least_knock
-    from rubhpc.running.knocks_on_ranks import least_knock_on
+    from rubhpc.running.knocks_on_ranks import least_knock_on, take_part
     from rubhpc.running.pool import connect
+    from rubhpc.running.workers import start_workers
     from rubhpc.study.study import read_study
 
     path = check_figure_path(figure or f"{study.stem}_knock.png")
     progress = path.with_name(f".{path.stem}.progress")
     data_path = check_data_path(data) if data else None
     largest = None if most is None else quantity(most, "N*s", "--most")
-    search: dict[str, Any] = {"angles": angles, "nodes": nodes, "most": largest, "tolerance": tolerance}
-    search |= {"progress": progress, "report": _report()}
-    if launch().size > 1:
-        if workers > 1:
-            raise InputError("--workers: mpirun has started several processes already; use one of the two")
-        found = least_knock_on(connect(), lambda: read_study(study, trust_rig=trust_rig), **search)
-    else:
-        found = least_knock(read_study(study, trust_rig=trust_rig), workers=workers, **search)
+    search |= {"most": largest, "progress": progress, "report": _report()}
+    with nullcontext(connect()) if workers == 1 else start_workers(workers, take_part) as pool:
+        found = least_knock_on(pool, lambda: read_study(study, trust_rig=trust_rig), **search)
     if launch().rank > 0:
         return 0
     drawing = resilience(found)

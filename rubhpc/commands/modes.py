@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from rubhpc.commands.quantity import quantity
+from rubhpc.commands.options import quantity
 from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
@@ -155,12 +155,7 @@ def _ends(pair: tuple[str, str] | None, option: str) -> tuple[float, float] | No
 
 
 def _plain(mode: Mode) -> dict[str, Any]:
-    return {
-        "frequency": mode.frequency,
-        "damping_ratio": mode.damping_ratio,
-        "kind": mode.kind,
-        "whirl": mode.whirl,
-    }
+    return {key: getattr(mode, key) for key in ("frequency", "damping_ratio", "kind", "whirl")}
 
 
 def _print_tables(
@@ -211,20 +206,20 @@ def _draw(model: Model, top_speed: float, count: int | None, path: Path) -> None
 
     from postproc.figures.drawing import house_style, new_figure, save
     from postproc.figures.linear_design import campbell_diagram
-    from rubhpc.fem.critical_speeds import campbell, critical_speeds
+    from rubhpc.fem.critical_speeds import campbell, find_critical_speeds, follow_modes
     from rubhpc.fem.linear_design import checked_range
 
     low, high = checked_range(model, None)
     low, high = (low, high) if not top_speed else (low if model.rotor.by_speed else 0.0, top_speed)
-    curves = campbell(model.rotor, np.linspace(low, high, N_SPEED))
+    speeds = np.linspace(low, high, N_SPEED)
+    tracks = follow_modes(model.rotor, speeds)
+    curves = campbell(model.rotor, speeds, tracks)
     lowest = curves["frequency"].min("speed")
-    limit = None
-    if count is None:
-        limit = 1.02 * max(high / math.pi, 1.1 * float(lowest[:4].max()))
-        curves = curves.isel(mode=(lowest < limit).values)
-    else:
-        curves = curves.isel(mode=slice(count))
+    limit = 1.02 * max(high / math.pi, 1.1 * float(lowest[:4].max())) if count is None else None
+    is_shown = (lowest < limit).values if limit else np.arange(len(tracks)) < (count or 0)
+    found = find_critical_speeds(model, speeds, tracks)
+    critical = [one.speed for one in found if is_shown[one.number - 1]]
     with house_style():
         figure, (ax,) = new_figure()
-        campbell_diagram(curves, ax, critical_speeds(curves), limit)
+        campbell_diagram(curves.isel(mode=is_shown), ax, critical, limit)
         save(figure, path)

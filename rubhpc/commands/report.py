@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from rubhpc.commands.quantity import quantity
+from rubhpc.commands.options import quantity
 
 _STORE = click.argument("store", type=click.Path(path_type=Path))
 

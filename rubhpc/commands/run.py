@@ -5,10 +5,11 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import click
 
-from rubhpc.commands.quantity import quantity
+from rubhpc.commands.options import STUDY, TRUST_STUDY, quantity
 from rubhpc.errors import InputError, RubError, StoreError
 from rubhpc.running.launch import end_with_launcher, launch
 
@@ -19,15 +20,12 @@ _OUTPUT = click.option(
     help="The store, in place of that of the study.",
 )
 _WHOLE_START = 1.5  # the store made and ended
-_TRUST = click.option(
-    "--trust-rig", is_flag=True, help='Run the Python code of a study whose rig is "FILE.py:FUNCTION".'
-)
 
 
 @click.command()
-@click.argument("study", metavar="STUDY.toml", type=click.Path(path_type=Path))
+@STUDY
 @_OUTPUT
-@_TRUST
+@TRUST_STUDY
 @click.option("--retry-failed", is_flag=True, help="Compute failed cases again.")
 @click.option(
     "--max-failures", type=click.IntRange(min=0), metavar="N", help="Stop when more than N cases fail."
@@ -59,14 +57,11 @@ def run(
     study: Path,
     output: Path | None,
     trust_rig: bool,
-    retry_failed: bool,
-    max_failures: int | None,
-    workers: int | None,
     part: str | None,
     time_limit: str | None,
-    accept_version: bool,
     only: str | None,
     quiet: bool,
+    **options: Any,
 ) -> int:
     """Run or resume STUDY.toml; with --workers, or under mpirun, on several processes.
 
@@ -88,14 +83,11 @@ def run(
             study,
             output=output,
             trust_rig=trust_rig,
-            retry_failed=retry_failed,
-            max_failures=max_failures,
             time_limit=None if time_limit is None else quantity(time_limit, "s", "--time-limit"),
-            accept_version=accept_version,
-            workers=workers,
             part=part,
             quiet=quiet,
             stopping=stopping,
+            **options,
         )
     if launch().rank == 0 and not quiet:
         click.echo(summary.text())
@@ -116,9 +108,9 @@ def _reproduce(study: Path, output: Path | None, name: str, *, trust_rig: bool) 
 
 
 @click.command()
-@click.argument("study", metavar="STUDY.toml", type=click.Path(path_type=Path))
+@STUDY
 @_OUTPUT
-@_TRUST
+@TRUST_STUDY
 @click.option("--part", metavar="K/N", help="Estimate only part K of N.")
 def plan(study: Path, output: Path | None, trust_rig: bool, part: str | None) -> int:
     """Estimate the cost of STUDY.toml and show what is done; writes nothing.
@@ -138,8 +130,8 @@ def plan(study: Path, output: Path | None, trust_rig: bool, part: str | None) ->
 
 
 @click.command("compile")
-@click.argument("study", metavar="STUDY.toml", type=click.Path(path_type=Path))
-@_TRUST
+@STUDY
+@TRUST_STUDY
 def compile_kernels(study: Path, trust_rig: bool) -> int:
     """Compile the kernels of STUDY.toml and compute nothing.
 

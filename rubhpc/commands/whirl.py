@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from rubhpc.commands.quantity import quantity
+from rubhpc.commands.options import plain_number, quantity
 from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
@@ -221,25 +221,19 @@ def _plain(found: xr.Dataset) -> dict[str, Any]:
         {
             "stator": int(one["stator"]),
             "node": int(one["node"]),
-            "least_friction": [[_number(v) for v in row] for row in one["least_friction"].values.tolist()],
+            "least_friction": plain_number(one["least_friction"].values.tolist()),
             "is_approximate": one["is_approximate"].values.tolist(),
         }
         for one in (found.isel(stator=i) for i in range(found.sizes["stator"]))
     ]
     listed = {
-        f"{dim}s": [{key: _number(value) for key, value in row.items()} for row in _rows(found, dim)]
+        f"{dim}s": [{key: plain_number(value) for key, value in row.items()} for row in _rows(found, dim)]
         for dim in ("threshold", "whirl", *(["knock"] if "knock" in found.dims else []))
     }
     return {
         "speed": found["speed"].values.tolist(),
         "clearance": found["clearance"].values.tolist(),
-        "most_frequency": _number(found.attrs["most_frequency"]),
+        "most_frequency": plain_number(found.attrs["most_frequency"]),
         "bores": bores,
         **listed,
     }
-
-
-def _number(value: Any) -> Any:
-    if isinstance(value, list):
-        return [_number(one) for one in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

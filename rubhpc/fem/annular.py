@@ -87,7 +87,7 @@ def annular_rub(model: Model, spin: float, clearance: float, friction: float) ->
         raise InputError(f"annular rub: {problem}; use a smaller clearance")
     turning = np.zeros(rotor.n_dof, dtype=np.complex128)
     turning[rows] = 1.0, -1j
-    dynamic = rotor.stiffness - spin**2 * rotor.mass + 1j * spin * (rotor.damping + spin * rotor.gyroscopic)
+    dynamic = rotor.dynamic_stiffness(spin, spin)
     lateral = [row for row in range(rotor.n_dof) if rotor.part[row] in rotor.part[rows]]
     receptance = np.linalg.solve(dynamic[np.ix_(lateral, lateral)], turning[lateral])[lateral.index(rows[0])]
     if spin < 0.0:  # mirror image
@@ -135,5 +135,4 @@ def _tip_receptance(stator: StatorModel, frequency: float) -> complex:
     """Return the radial receptance of a stator's tip at a frequency (rad/s), m/N."""
     body = stator.body
     tip = np.arange(body.n_dof) == stator.axial
-    dynamic = body.stiffness - frequency**2 * body.mass + 1j * frequency * body.damping
-    return complex(tip @ np.linalg.solve(dynamic, tip.astype(np.complex128)))
+    return complex(tip @ np.linalg.solve(body.dynamic_stiffness(frequency), tip.astype(np.complex128)))

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rubhpc.errors import InputError
+from rubhpc.errors import InputError, located
 from rubhpc.fem.carrier import assemble_carrier
 from rubhpc.fem.model import MOST_DEGREES, Model, check_computable, computable
 from rubhpc.fem.rotor import assemble_rotor
-from rubhpc.fem.statics import at_rest_under, caught, sag_at
+from rubhpc.fem.statics import at_rest_under, caught
 from rubhpc.fem.stator import assemble_stator
 from rubhpc.rig.rotors import Load, Unbalance
 from rubhpc.rig.stators import Stator
@@ -98,15 +98,13 @@ def _set_about_the_shaft(
     stators: list[StatorModel], body: Body, load: NDArray[np.float64], spin: float
 ) -> list[StatorModel]:
     """Stators set about the centre of the shaft where it rests under its loads at a spin, rad/s."""
-    try:
+    with located("[rotor] clearance_from: "):
         turning = body.at(spin)
-    except InputError as error:
-        raise InputError(f"[rotor] clearance_from: {error}") from None
     sag, _ = at_rest_under(turning, load, spin)
     placed = []
     for stator in stators:
-        (v, w), (y, z) = sag_at(turning, sag, stator.node), stator.centre
-        placed.append(replace(stator, centre=(v + y, w + z)))
+        (v, w), (y, z) = turning.at_node(stator.node, sag), stator.centre
+        placed.append(replace(stator, centre=(float(v + y), float(w + z))))
     return placed
 
 

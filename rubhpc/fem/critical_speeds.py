@@ -86,32 +86,6 @@ def follow_modes(body: Body, speeds: Sequence[float] | NDArray[np.float64]) -> l
     return list(zip(*followed, strict=True))
 
 
-def critical_speeds(curves: xr.Dataset, order: float = 1.0) -> list[tuple[int, float]]:
-    """Return the spins at which a multiple of the spin frequency equals the frequency of a lateral mode.
-
-    Parameters
-    ----------
-    curves : xarray.Dataset
-        From `campbell`.
-    order : float
-        Multiple of the spin frequency; 1 for unbalance.
-
-    Returns
-    -------
-    list of (mode, speed)
-        Number of the mode and spin (rad/s), interpolated linearly; by rising speed.
-    """
-    speeds = curves["speed"].values
-    excess = order * speeds / (2 * math.pi) - curves["frequency"].values
-    excess[curves["kind"].values != "lateral"] = np.nan
-    crossings = []
-    for i_mode, i_speed in zip(*np.nonzero((excess[:, :-1] < 0.0) & (excess[:, 1:] >= 0.0)), strict=True):
-        before, after = excess[i_mode, i_speed : i_speed + 2]
-        step = speeds[i_speed + 1] - speeds[i_speed]
-        crossings.append((int(i_mode), float(speeds[i_speed] - before / (after - before) * step)))
-    return sorted(crossings, key=lambda crossing: crossing[1])
-
-
 def matches(body: Body, before: Sequence[Mode], after: Sequence[Mode]) -> NDArray[np.intp]:
     """Return the number in `after` of the match of each mode in `before`, (n_mode,), at a nearby speed.
 

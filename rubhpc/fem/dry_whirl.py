@@ -14,9 +14,9 @@ from rubhpc.fem.assemble import assemble, model_at
 from rubhpc.fem.linear_design import checked_range
 from rubhpc.fem.modes import KINDS, undamped_modes
 from rubhpc.fem.receptance import turning_receptances, twist_receptance
-from rubhpc.fem.statics import sag_at
 from rubhpc.fem.whirl_balance import ROLLING, SLIPPING, Balance
 from rubhpc.rig.normal_law import NormalLaw
+from rubhpc.schema import described
 from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
@@ -155,24 +155,28 @@ def dry_whirl(
     along = ("stator", "speed", "clearance")
     found = xr.Dataset(
         {
-            "least_friction": (along, least, _unit("1", "Least friction of a dry whirl")),
+            "least_friction": (along, least, described("1", "Least friction of a dry whirl")),
             "is_approximate": (along, is_approximate),
         },
         coords={
             "stator": np.array(bores) + 1,
             "node": ("stator", [model.stators[i].node for i in bores], {"long_name": "Node"}),
-            "speed": ("speed", spins, _unit("rad s-1", "Spin speed")),
-            "clearance": ("clearance", gaps, _unit("m", "Radial clearance")),
+            "speed": ("speed", spins, described("rad s-1", "Spin speed")),
+            "clearance": ("clearance", gaps, described("m", "Radial clearance")),
         },
         attrs={"rig": rig.name, "frictions": [float(mu) for mu in frictions], "most_frequency": top},
     )
     _add_columns(found, "threshold", thresholds)
     _add_columns(found, "whirl", whirls)
-    found["whirl_growth_rate"] = "whirl", [row["growth_rate"] for row in whirls], _unit("s-1", "Growth rate")
+    found["whirl_growth_rate"] = (
+        "whirl",
+        [row["growth_rate"] for row in whirls],
+        described("s-1", "Growth rate"),
+    )
     number, w, needed = np.concatenate(curve, axis=1)
     found["curve_stator"] = "point", number.astype(int)
-    found["curve_frequency"] = "point", w, _unit("rad s-1", "Whirl frequency")
-    found["curve_friction"] = "point", needed, _unit("1", "Friction that a slipping whirl needs")
+    found["curve_frequency"] = "point", w, described("rad s-1", "Whirl frequency")
+    found["curve_friction"] = "point", needed, described("1", "Friction that a slipping whirl needs")
     return found
 
 
@@ -299,7 +303,7 @@ def _receptances(
 
 def _offset(model: Model, stator: StatorModel) -> float:
     """Distance of the shaft at rest from the centre of a bore, m."""
-    at = sag_at(model.rotor, model.sag, stator.node)
+    at = model.rotor.at_node(stator.node, model.sag)
     return math.hypot(at[0] - stator.centre[0], at[1] - stator.centre[1])
 
 
@@ -318,8 +322,4 @@ def _add_columns(found: xr.Dataset, dim: str, rows: Sequence[Row]) -> None:
     found[f"{dim}_stator"] = dim, np.array([row["stator"] for row in rows], dtype=int)
     found[f"{dim}_kind"] = dim, np.array([row["kind"] for row in rows], dtype="U8")
     for name, units in _COLUMNS.items():
-        found[f"{dim}_{name}"] = dim, np.array([row[name] for row in rows], dtype=float), _unit(*units)
-
-
-def _unit(units: str, name: str) -> dict[str, str]:
-    return {"units": units, "long_name": name}
+        found[f"{dim}_{name}"] = dim, np.array([row[name] for row in rows], dtype=float), described(*units)

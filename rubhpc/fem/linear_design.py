@@ -20,6 +20,7 @@ from rubhpc.fem.separation_margin import (
 )
 from rubhpc.fem.stability import logarithmic_decrement, threshold_speed
 from rubhpc.rig.rotors import Rotor
+from rubhpc.schema import described
 from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
@@ -114,7 +115,7 @@ def linear_design(
         combine_attrs="drop_conflicts",
     )
     threshold = threshold_speed(model.rotor, speeds, tracks)
-    design["threshold_speed"] = ((), threshold, _unit("rad s-1", "Threshold speed of instability"))
+    design["threshold_speed"] = ((), threshold, described("rad s-1", "Threshold speed of instability"))
     bearings = sorted({rig.rotor.node_of(bearing) for bearing in rig.rotor.bearing})
     design.attrs = {"rig": rig.name, "speed_range": [low, high], "bearing_nodes": bearings}
     if operating is not None:
@@ -155,7 +156,7 @@ def _modes(model: Model, speeds: NDArray[np.float64], tracks: Sequence[tuple[Mod
         ("growth_rate", lambda mode: mode.eigenvalue.real, "s-1", "Growth rate"),
     ):
         values = [[value(mode) for mode in track] for track in tracks]
-        curves[name] = (("mode", "speed"), values, _unit(unit, title))
+        curves[name] = (("mode", "speed"), values, described(unit, title))
     return curves.assign_coords(mode=("mode", np.arange(1, len(tracks) + 1), {"long_name": "Mode"}))
 
 
@@ -165,7 +166,7 @@ def _positions(rig: Rig, model: Model) -> xr.Dataset:
     positions = np.full(len(nodes), np.nan)
     if isinstance(rig.rotor, Rotor):
         positions = rig.rotor.positions[np.array(nodes) - 1]
-    place = ("node", positions, _unit("m", "Position along the shaft"))
+    place = ("node", positions, described("m", "Position along the shaft"))
     return xr.Dataset(coords={"node": nodes, "position": place})
 
 
@@ -176,7 +177,7 @@ def _sag(model: Model, speeds: NDArray[np.float64]) -> xr.Dataset:
     for name, direction in (("v", "vertical"), ("w", "horizontal")):
         rows = np.array([model.rotor.index(node, name) for node in nodes])
         values = np.where(rows >= 0, sag[:, rows], 0.0)
-        columns[f"sag_{direction}"] = (("speed", "node"), values, _unit("m", f"Static sag, {direction}"))
+        columns[f"sag_{direction}"] = (("speed", "node"), values, described("m", f"Static sag, {direction}"))
     return xr.Dataset(columns, coords={"node": nodes})
 
 
@@ -196,15 +197,19 @@ def _critical(model: Model, critical: Sequence[CriticalSpeed]) -> xr.Dataset:
             "critical_speed": (
                 "critical",
                 [found.speed for found in critical],
-                _unit("rad s-1", "Critical speed"),
+                described("rad s-1", "Critical speed"),
             ),
             "critical_mode": ("critical", [found.number for found in critical]),
             "critical_whirl": ("critical", np.array([mode.whirl for mode in modes], dtype=str)),
-            "critical_damping_ratio": ("critical", [mode.damping_ratio for mode in modes], _unit("1", "")),
-            "excitation": ("critical", [found.excitation for found in critical], _unit("1", "")),
+            "critical_damping_ratio": (
+                "critical",
+                [mode.damping_ratio for mode in modes],
+                described("1", ""),
+            ),
+            "excitation": ("critical", [found.excitation for found in critical], described("1", "")),
             "is_excited": ("critical", np.array([found.is_excited for found in critical], dtype=bool)),
-            "shape_vertical": (along, parts[:, :, 0], _unit("1", "Mode shape, vertical")),
-            "shape_horizontal": (along, parts[:, :, 1], _unit("1", "Mode shape, horizontal")),
+            "shape_vertical": (along, parts[:, :, 0], described("1", "Mode shape, vertical")),
+            "shape_horizontal": (along, parts[:, :, 1], described("1", "Mode shape, horizontal")),
         },
         coords={"node": nodes, "part": ["real", "imaginary"]},
     )
@@ -230,13 +235,11 @@ def _peaks(
         required = [peak.required_margin(operating) for peak in peaks]
         columns["separation_margin"] = (margins, "1", "Separation margin")
         columns["required_margin"] = (required, "1", "Separation margin required by API 617")
-    table = xr.Dataset({name: ("peak", v, _unit(unit, title)) for name, (v, unit, title) in columns.items()})
+    table = xr.Dataset(
+        {name: ("peak", v, described(unit, title)) for name, (v, unit, title) in columns.items()}
+    )
     table["peak_node"] = ("peak", np.array([node for node, _ in found], dtype=int))
     if operating is not None:
         separated = [peak.is_separated(operating) for peak in peaks]
         table["is_separated"] = ("peak", np.array(separated, dtype=bool))
     return table
-
-
-def _unit(units: str, name: str) -> dict[str, str]:
-    return {"units": units} | ({"long_name": name} if name else {})

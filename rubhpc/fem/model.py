@@ -17,6 +17,7 @@ from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
+    from typing import Any
 
     from numpy.typing import NDArray
 
@@ -179,6 +180,17 @@ class Body:
         wanted = {part[row] for row, (_, name) in enumerate(self.degrees) if name in names}
         return [row for row, number in enumerate(part) if number in wanted]
 
+    def dynamic_stiffness(self, rate: float, spin: float = 0.0) -> NDArray[np.complex128]:
+        """Forces over displacements that oscillate at a rate, rad/s: `K - rate^2 M + i rate (D + spin G)`."""
+        damping = self.damping + spin * self.gyroscopic
+        found: NDArray[np.complex128] = self.stiffness - rate**2 * self.mass + 1j * rate * damping
+        return found
+
+    def at_node(self, node: int, values: NDArray[Any], names: Sequence[str] = ("v", "w")) -> tuple[Any, ...]:
+        """Values (n_dof,) at degrees of a node, by default up and horizontally; 0 where there is none."""
+        rows = (self.index(node, name) for name in names)
+        return tuple(values[row] if row >= 0 else 0.0 for row in rows)
+
     def index(self, node: int, name: str) -> int:
         """Row of a degree of freedom; -1 where it is constrained or absent."""
         try:
@@ -321,8 +333,7 @@ class Model:
     @cached_property
     def output_sag(self) -> NDArray[np.float64]:
         """Sag of the output node: vertical, horizontal and torsional, (3,), m, m and rad."""
-        rows = (self.rotor.index(self.output_node, name) for name in ("v", "w", "thx"))
-        return np.array([self.sag[row] if row >= 0 else 0.0 for row in rows])
+        return np.array(self.rotor.at_node(self.output_node, self.sag, ("v", "w", "thx")))
 
     @cached_property
     def n_place(self) -> int:

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.errors import InputError
+from rubhpc.errors import InputError, located
 from rubhpc.fem.beam import rayleigh_coefficients
 from rubhpc.fem.carrier import own_matrices
 from rubhpc.fem.model import ProbeRows
-from rubhpc.fem.statics import sag_at
 from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.rig.probes import MOTIONS, TWISTS
 from rubhpc.rig.rotors import Rotor
@@ -66,10 +65,8 @@ def with_probes(model: Model, rig: Rig, probes: Sequence[Probe], spin: float) ->
             here, there = model.rotor.index(node, name), model.rotor.index(far or 0, name)
             _add_force(rows[DISPLACEMENT, k], np.ones(1), [here], [there])
     for i, probe in enumerate(probes):
-        try:
+        with located(f"[record] probe {probe.name}: "):
             _fill(rows[:, i], probe, model, rig, spin)
-        except InputError as error:
-            raise InputError(f"[record] probe {probe.name}: {error}") from None
     constant = seen_at_rest(model, probes, rows[DISPLACEMENT])
     return replace(
         model,
@@ -85,7 +82,7 @@ def seen_at_rest(model: Model, probes: Sequence[Probe], rows: Floats) -> Floats:
     for i, probe in enumerate(probes):
         if model.film is not None and probe.quantity == "bearing_force" and probe.node in journals:
             assert probe.node is not None
-            up, aside = sag_at(model.rotor, model.film, probe.node)
+            up, aside = model.rotor.at_node(probe.node, model.film)
             constant[i] -= math.cos(probe.angle) * up + math.sin(probe.angle) * aside
     return constant
 

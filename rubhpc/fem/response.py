@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +19,6 @@ if TYPE_CHECKING:
     from rubhpc.fem.model import Body, Model
 
 PHASES = 3600  # of a revolution, at which an orbit in a bore is looked at: 4e-7 of its amplitude
-SMALL = 256  # degrees of a rotor whose frequencies are kept for other speeds and stators: 1 MB
 
 
 def steady_response(model: Model, spin: float) -> NDArray[np.complex128]:
@@ -49,9 +47,7 @@ def steady_response(model: Model, spin: float) -> NDArray[np.complex128]:
     response = np.zeros(rotor.n_dof, dtype=np.complex128)
     if spin == 0.0:
         return response
-    dynamic = (
-        rotor.stiffness - spin**2 * rotor.mass + 1j * spin * (rotor.damping + spin * rotor.gyroscopic)
-    )[block]
+    dynamic = rotor.dynamic_stiffness(spin, spin)[block]
     force = spin**2 * (model.unbalance_cosine - 1j * model.unbalance_sine)[lateral]
     try:
         response[lateral] = np.linalg.solve(dynamic, force)
@@ -87,8 +83,7 @@ def harmonic_response(
     InputError
         If that is a natural frequency of an undamped rotor.
     """
-    rotor, rate = model.rotor.at(spin), order * spin
-    dynamic = rotor.stiffness - rate**2 * rotor.mass + 1j * rate * (rotor.damping + spin * rotor.gyroscopic)
+    dynamic = model.rotor.at(spin).dynamic_stiffness(order * spin, spin)
     try:
         return np.asarray(np.linalg.solve(dynamic, force))
     except np.linalg.LinAlgError:
@@ -113,8 +108,7 @@ def contact_free_amplitude(model: Model, spin: float, node: int | None = None) -
     """
     node = model.output_node if node is None else node
     response = steady_response(model, spin)
-    rows = [model.rotor.index(node, name) for name in ("v", "w")]
-    v, w = (response[row] if row >= 0 else 0.0 for row in rows)
+    v, w = model.rotor.at_node(node, response)
     return float(abs(v + 1j * w) + abs(v - 1j * w)) / 2
 
 
@@ -135,8 +129,7 @@ def contact_free_reach(model: Model, spin: float) -> float:
     nearer, aside = sag_at_stators(model)
     reach = -math.inf
     for stator, sag, off in zip(model.stators, nearer, aside, strict=True):
-        rows = [model.rotor.index(stator.node, name) for name in ("v", "w")]
-        v, w = (response[row] if row >= 0 else 0.0 for row in rows)
+        v, w = model.rotor.at_node(stator.node, response)
         if stator.is_bore:
             turn = np.exp(2j * np.pi * np.arange(PHASES) / PHASES)
             away = np.abs((v * turn).real + sag + 1j * ((w * turn).real - off)).max()
@@ -157,26 +150,12 @@ def first_lateral_frequency(model: Model) -> float:
     stiffness = undamped.stiffness[np.ix_(rows, rows)]
     is_alone = all(undamped.degrees[row][1] in KINDS["lateral"] for row in rows)
     if is_alone and np.array_equal(stiffness, stiffness.T):
-        mass = undamped.mass[np.ix_(rows, rows)]
-        is_small = len(rows) <= SMALL
-        found = (
-            _frequencies(mass.tobytes(), stiffness.tobytes())
-            if is_small
-            else np.sqrt(undamped_modes(mass, stiffness)[0])
-        )
+        found = np.sqrt(undamped_modes(undamped.mass[np.ix_(rows, rows)], stiffness)[0])
     else:
         found = 2 * math.pi * np.array([m.frequency for m in modes(undamped) if m.kind == "lateral"])
     if not (found > 0.0).any():
         raise InputError("speed_ratio: the rotor has no lateral natural frequency; give the speed instead")
     return float(found[found > 0.0].min())
-
-
-@lru_cache(maxsize=4)
-def _frequencies(mass: bytes, stiffness: bytes) -> NDArray[np.float64]:
-    """Undamped natural frequencies, rad/s, of matrices (n, n): once for all speeds and stators of a rotor."""
-    n = math.isqrt(len(mass) // 8)
-    square, _ = undamped_modes(*(np.frombuffer(matrix).reshape(n, n) for matrix in (mass, stiffness)))
-    return np.sqrt(square)
 
 
 def step_limit(model: Model) -> float:

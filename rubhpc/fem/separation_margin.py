@@ -18,7 +18,8 @@ import numpy as np
 import xarray as xr
 from scipy.optimize import brentq, minimize_scalar
 
-from rubhpc.fem.response import check_response_node, contact_free_amplitude, response_nodes, steady_response
+from rubhpc.fem.response import contact_free_amplitude, response_nodes, steady_response
+from rubhpc.schema import described
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -32,18 +33,15 @@ if TYPE_CHECKING:
 def unbalance_response(
     model: Model,
     speeds: Sequence[float] | NDArray[np.float64],
-    nodes: Sequence[int] | None = None,
     probes: Sequence[float] = (0.0, math.pi / 2),
 ) -> xr.Dataset:
-    """Return the steady response to the rotor's unbalance over a range of speeds.
+    """Return the steady response to the rotor's unbalance over a range of speeds, at all nodes it moves.
 
     Parameters
     ----------
     model : Model
     speeds : (n_speed,)
         Spin, rad/s.
-    nodes : sequence of int, optional
-        By default all that move sideways.
     probes : sequence of float
         Angles of displacement probes, rad, from straight up with the spin: 0 sees v, pi / 2 sees w.
 
@@ -59,17 +57,14 @@ def unbalance_response(
     Raises
     ------
     InputError
-        When a node does not move sideways, a bearing has no coefficients at a speed, or the rotor resonates
-        without damping.
+        When a bearing has no coefficients at a speed, or the rotor resonates without damping.
 
     Notes
     -----
     `v + i w = F exp(i spin t) + conj(B) exp(-i spin t)`, a forward and a backward circle; the semi-axes are
     |F| + |B| and |F| - |B|.
     """
-    nodes = response_nodes(model) if nodes is None else list(nodes)
-    for node in nodes:
-        check_response_node(model, node)
+    nodes = response_nodes(model)
     rows = np.array([[model.rotor.index(node, name) for name in ("v", "w")] for node in nodes])
     response = np.stack([steady_response(model, float(speed)) for speed in speeds])
     v, w = np.moveaxis(np.where(rows >= 0, response[:, rows], 0.0), -1, 0)
@@ -81,26 +76,23 @@ def unbalance_response(
     over = ("speed", "node")
     return xr.Dataset(
         {
-            "major_axis": (over, forward + backward, _unit("m", "Major semi-axis of the orbit")),
-            "minor_axis": (over, forward - backward, _unit("m", "Minor semi-axis of the orbit")),
-            "amplitude": ((*over, "probe"), np.abs(seen), _unit("m", "Amplitude at the probe")),
-            "phase": ((*over, "probe"), phase, _unit("rad", "Phase lead at the probe")),
+            "major_axis": (over, forward + backward, described("m", "Major semi-axis of the orbit")),
+            "minor_axis": (over, forward - backward, described("m", "Minor semi-axis of the orbit")),
+            "amplitude": ((*over, "probe"), np.abs(seen), described("m", "Amplitude at the probe")),
+            "phase": ((*over, "probe"), phase, described("rad", "Phase lead at the probe")),
         },
         coords={
-            "speed": ("speed", np.asarray(speeds, dtype=np.float64), _unit("rad s-1", "Spin speed")),
+            "speed": ("speed", np.asarray(speeds, dtype=np.float64), described("rad s-1", "Spin speed")),
             "node": ("node", nodes, {"long_name": "Node of the rotor"}),
-            "probe": ("probe", np.asarray(probes, dtype=np.float64), _unit("rad", "Angle of the probe")),
+            "probe": ("probe", np.asarray(probes, dtype=np.float64), described("rad", "Angle of the probe")),
         },
     )
-
-
-def _unit(units: str, name: str) -> dict[str, str]:
-    return {"units": units, "long_name": name}
 
 
 HALF_POWER = math.sqrt(0.5)
 CRITICALLY_DAMPED = 2.5  # amplification factor below which no margin is asked for
 _ACROSS = np.array([-8.0, -4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0, 8.0])  # half widths of a resonance
+_N_SPEED = 301  # evenly spaced ones
 _NARROWEST = 1e-8  # half width of a resonance without damping, whose response is unbounded, over its speed
 
 
@@ -174,25 +166,22 @@ def amplitude_over_speed(model: Model, node: int, probe: float | None = None) ->
     """
     if probe is None:
         return lambda spin: contact_free_amplitude(model, spin, node)
-    rows = [model.rotor.index(node, name) for name in ("v", "w")]
-    parts = list(zip(rows, (math.cos(probe), math.sin(probe)), strict=True))
+    along, across = math.cos(probe), math.sin(probe)
 
     def amplitude(spin: float) -> float:
-        response = steady_response(model, spin)
-        return float(abs(sum(share * response[row] for row, share in parts if row >= 0)))
+        v, w = model.rotor.at_node(node, steady_response(model, spin))
+        return float(abs(along * v + across * w))
 
     return amplitude
 
 
-def grid_through(
-    low: float, high: float, critical: Sequence[CriticalSpeed] = (), n_speed: int = 301
-) -> NDArray[np.float64]:
+def grid_through(low: float, high: float, critical: Sequence[CriticalSpeed] = ()) -> NDArray[np.float64]:
     """Return speeds from low to high, rad/s, some within the half width of each critical speed.
 
     None is at a critical speed without damping, where the response is unbounded, nor near one that the
     unbalance does not excite, where it is rounding.
     """
-    grid = np.linspace(low, high, n_speed)
+    grid = np.linspace(low, high, _N_SPEED)
     for c in critical:
         speed, width = abs(c.speed), abs(c.speed) * max(abs(c.mode.damping_ratio), _NARROWEST)
         is_damped = abs(c.mode.damping_ratio) >= _NARROWEST

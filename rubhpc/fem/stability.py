@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.fem.model import Body, Model
+    from rubhpc.fem.model import Body, CarrierModel, Model
     from rubhpc.fem.modes import Mode
 
 
@@ -60,16 +60,20 @@ def is_passive(body: Body) -> bool:
     return all(values[0] >= -_SYMMETRY * np.abs(values).max() for values in spectra)
 
 
-def is_rounding(mode: Mode, greatest: float) -> bool:
-    """Whether growth or decay of a mode is rounding; `greatest` is the largest eigenvalue's size, rad/s."""
-    size = abs(mode.eigenvalue)
-    return abs(mode.eigenvalue.real) <= _ROUNDING * size or size <= _ROUNDING_OF_GREATEST * greatest
+def _rates(found: Sequence[Mode]) -> list[tuple[Mode, float]]:
+    """Return all modes of a body, each with its rate of growth, 1/s, which is 0 where it is rounding."""
+    least = _ROUNDING_OF_GREATEST * max((abs(mode.eigenvalue) for mode in found), default=0.0)
+
+    def rate(mode: Mode) -> float:
+        size, growth = abs(mode.eigenvalue), mode.eigenvalue.real
+        return growth if abs(growth) > _ROUNDING * size and size > least else 0.0
+
+    return [(mode, rate(mode)) for mode in found]
 
 
 def growing_modes(found: Sequence[Mode]) -> list[Mode]:
     """Return those of all modes of a body that grow, the fastest to grow first."""
-    greatest = max((abs(mode.eigenvalue) for mode in found), default=0.0)
-    growing = [m for m in found if m.eigenvalue.real > 0.0 and not is_rounding(m, greatest)]
+    growing = [mode for mode, rate in _rates(found) if rate > 0.0]
     return sorted(growing, key=lambda mode: -mode.eigenvalue.real)
 
 
@@ -129,9 +133,7 @@ def undamped(body: Body, spin: float = 0.0) -> list[Mode]:
     body = body.at(spin)
     if _takes_energy_from_all(body):
         return []
-    found = modes(body, spin)
-    greatest = max((abs(mode.eigenvalue) for mode in found), default=0.0)
-    return [mode for mode in found if mode.frequency > 0.0 and is_rounding(mode, greatest)]
+    return [mode for mode, rate in _rates(modes(body, spin)) if mode.frequency > 0.0 and not rate]
 
 
 def undamped_message(model: Model, spin: float) -> str:
@@ -141,10 +143,7 @@ def undamped_message(model: Model, spin: float) -> str:
     counts with it.
     """
     found = [("the rotor", [mode for mode in undamped(model.rotor, spin) if mode.kind != "axial"])]
-    found += [
-        (f"carrier {carrier.name} with {stator_names(carrier.stators)}", undamped(carrier.body))
-        for carrier in model.carriers
-    ]
+    found += [(_carrier_name(carrier), undamped(carrier.body)) for carrier in model.carriers]
     carried = {number for carrier in model.carriers for number in carrier.stators}
     alike: dict[tuple[tuple[str, str], ...], tuple[list[int], list[Mode]]] = {}  # a ring is named once
     for number, stator in enumerate(model.stators, start=1):
@@ -189,17 +188,15 @@ def decay_message(cases: Iterable[tuple[Model, float]]) -> str:
 def _decaying(model: Model, spin: float) -> Iterator[tuple[str, Mode]]:
     """The modes at a spin that decay, each with the name of its body; of equal stators those of the first."""
     bodies = {id(stator.body): (f"stator {k}", stator.body) for k, stator in enumerate(model.stators, 1)}
-    bodies |= {
-        id(carrier.body): (f"carrier {carrier.name} with {stator_names(carrier.stators)}", carrier.body)
-        for carrier in model.carriers
-    }
+    bodies |= {id(carrier.body): (_carrier_name(carrier), carrier.body) for carrier in model.carriers}
     rotor = [mode for mode in modes(model.rotor, spin) if mode.kind != "axial"]
     found = [("the rotor", rotor), *((name, modes(body)) for name, body in bodies.values())]
     for name, those in found:
-        greatest = max((abs(mode.eigenvalue) for mode in those), default=0.0)
-        for mode in those:
-            if mode.frequency > 0.0 and mode.eigenvalue.real < 0.0 and not is_rounding(mode, greatest):
-                yield name, mode
+        yield from ((name, mode) for mode, rate in _rates(those) if mode.frequency > 0.0 and rate < 0.0)
+
+
+def _carrier_name(carrier: CarrierModel) -> str:
+    return f"carrier {carrier.name} with {stator_names(carrier.stators)}"
 
 
 def stator_names(stators: Sequence[int]) -> str:

@@ -88,17 +88,11 @@ def sag_at_stators(model: Model) -> tuple[Floats, Floats]:
     if not model.sag.any() and not any(any(stator.centre) for stator in model.stators):
         return nearer, aside
     for i, stator in enumerate(model.stators):
-        at = sag_at(model.rotor, model.sag, stator.node)
+        at = model.rotor.at_node(stator.node, model.sag)
         v, w = (now - then for now, then in zip(at, stator.centre, strict=True))
         ey, ez = np.cos(stator.angle), np.sin(stator.angle)
         nearer[i], aside[i] = ey * v + ez * w, ez * v - ey * w
     return nearer, aside
-
-
-def sag_at(body: Body, sag: Floats, node: int) -> tuple[float, float]:
-    """Vertical and horizontal part at a node of a sag (n_dof,), m, or of forces."""
-    v, w = (body.index(node, name) for name in ("v", "w"))
-    return float(sag[v]) if v >= 0 else 0.0, float(sag[w]) if w >= 0 else 0.0
 
 
 SOFTNESS = 100.0  # 1/s2: a thousandth of the weight in a clearance of 0.1 mm

@@ -77,29 +77,28 @@ def _check_series(values: Any, limits: Limits) -> str:
     return next(problems, "")
 
 
-def _parse_count(value: object, limits: Limits, where: str) -> int | str:
-    if isinstance(value, str) and value in limits["or_words"]:
-        return value
-    if isinstance(value, str) and value in limits["gone"]:
-        raise InputError(f"{where}: {limits['gone'][value]}")
+def _parse_count(value: Any, limits: Limits, where: str) -> int | str:
     if isinstance(value, float) and value.is_integer():
         return int(value)  # an axis holds floats
-    if isinstance(value, bool) or not isinstance(value, Integral):
-        words = "".join(f', or "{word}"' for word in limits["or_words"])
-        raise InputError(
-            f"{where}: {brief(value)} is not a whole number; write one such as 12, without quotes{words}"
-        )
-    return int(value)
+    if problem := _not_a_count(value, limits):
+        raise InputError(f"{where}: {problem}")
+    return value if isinstance(value, str) else int(value)
 
 
-def _check_count(value: object, limits: Limits) -> str:
-    if isinstance(value, str) and value in limits["or_words"]:
-        return ""
+def _not_a_count(value: object, limits: Limits) -> str:
     if isinstance(value, str) and value in limits["gone"]:
         return str(limits["gone"][value])
-    if type(value) is not int and (isinstance(value, bool) or not isinstance(value, Integral)):
-        words = "".join(f', or "{word}"' for word in limits["or_words"])
-        return f"{brief(value)} is not a whole number; give one such as 12{words}"
+    is_number = isinstance(value, Integral) and not isinstance(value, bool)
+    if is_number or (isinstance(value, str) and value in limits["or_words"]):
+        return ""
+    words = "".join(f', or "{word}"' for word in limits["or_words"])
+    return f"{brief(value)} is not a whole number; write one such as 12, without quotes{words}"
+
+
+def _check_count(value: Any, limits: Limits) -> str:
+    problem = _not_a_count(value, limits)
+    if problem or isinstance(value, str):
+        return problem
     if int(value) < limits["at_least"]:
         return f"{brief(value)} is out of range; it must be at least {limits['at_least']}"
     if limits["at_most"] is not None and int(value) > limits["at_most"]:
@@ -107,18 +106,17 @@ def _check_count(value: object, limits: Limits) -> str:
     return ""
 
 
-def _parse_flag(value: object, _: Limits, where: str) -> bool:
+def _parse_flag(value: object, limits: Limits, where: str) -> bool:
     if isinstance(value, float) and value in (0.0, 1.0):
         return bool(value)  # an axis holds floats
-    if not isinstance(value, bool):
-        raise InputError(
-            f"{where}: {brief(value)} is neither true nor false; write one of them, without quotes"
-        )
-    return value
+    if problem := _check_flag(value, limits):
+        raise InputError(f"{where}: {problem}")
+    return bool(value)
 
 
 def _check_flag(value: object, _: Limits) -> str:
-    return "" if isinstance(value, bool) else f"{brief(value)} is neither true nor false"
+    fix = "write one of them, without quotes"
+    return "" if isinstance(value, bool) else f"{brief(value)} is neither true nor false; {fix}"
 
 
 def _parse_text(value: object, limits: Limits, where: str) -> str:

@@ -13,7 +13,7 @@ from rubhpc.errors import InputError
 from rubhpc.input.messages import brief, nearest
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
 LEAST, GREATEST = 1e-30, 1e30  # size of a quantity: beyond, sums of products of a few leave the floats
 # One number, then a product of units. Nothing else reaches pint, whose grammar also takes sums and towers of
@@ -224,19 +224,12 @@ def read_range(table: Mapping[str, object], unit: str, where: str) -> list[float
     InputError
         When the table is not a range, or has too many values.
     """
-    for key in table:
-        if key not in RANGE_KEYS:
-            raise InputError(f"{where}: unknown key {brief(key)} in a range; {nearest(key, RANGE_KEYS)}")
-    for key in ("start", "stop"):
-        if key not in table:
-            raise InputError(
-                f"{where}: a range needs {key}; write {{ start, stop, step }} or {{ start, stop, num }}"
-            )
+    fix = "write { start, stop, step } or { start, stop, num }"
+    start, stop = _start_and_stop(table, unit, where, RANGE_KEYS, fix)
     if ("step" in table) == ("num" in table):
         raise InputError(
             f"{where}: a range has either step or num; write one of them, or add [sample] to draw values"
         )
-    start, stop = (parse_quantity(table[key], unit, f"{where}: {key}") for key in ("start", "stop"))
     if "step" in table:
         if "scale" in table:
             raise InputError(f"{where}: scale conflicts with step; use num instead of step, or remove scale")
@@ -264,16 +257,23 @@ def read_ends(table: Mapping[str, object], unit: str, where: str) -> Range:
         if key in table:
             problem = f"{key}: a sample is drawn from start to stop"
             raise InputError(f"{where}: {problem}; remove {key} or [sample]")
-    for key in table:
-        if key not in _DRAWN_KEYS:
-            raise InputError(f"{where}: unknown key {brief(key)} in a range; {nearest(key, _DRAWN_KEYS)}")
-    for key in ("start", "stop"):
-        if key not in table:
-            raise InputError(f"{where}: a range needs {key}; write {{ start, stop }}")
-    start, stop = (parse_quantity(table[key], unit, f"{where}: {key}") for key in ("start", "stop"))
+    start, stop = _start_and_stop(table, unit, where, _DRAWN_KEYS, "write { start, stop }")
     if start == stop:
         raise InputError(f"{where}: start and stop are both {start:g}; write that value alone")
     return Range(start=start, stop=stop, scale=_scale(table, start, stop, where))
+
+
+def _start_and_stop(
+    table: Mapping[str, object], unit: str, where: str, known: Sequence[str], fix: str
+) -> tuple[float, float]:
+    for key in table:
+        if key not in known:
+            raise InputError(f"{where}: unknown key {brief(key)} in a range; {nearest(key, known)}")
+    for key in ("start", "stop"):
+        if key not in table:
+            raise InputError(f"{where}: a range needs {key}; {fix}")
+    start, stop = (parse_quantity(table[key], unit, f"{where}: {key}") for key in ("start", "stop"))
+    return start, stop
 
 
 def _scale(table: Mapping[str, object], start: float, stop: float, where: str) -> str:

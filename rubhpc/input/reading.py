@@ -11,7 +11,7 @@ import re
 import tomllib
 from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin, get_type_hints
 
-from rubhpc.errors import InputError, printable
+from rubhpc.errors import InputError, located, printable
 from rubhpc.input.fields import KINDS, FieldError, check_value, key_of, parse_field
 from rubhpc.input.messages import brief, nearest, place
 
@@ -243,10 +243,8 @@ def replace_keys(owner: T, values: Mapping[str, object]) -> T:
     """
     parsed = {}
     for dotted, value in values.items():
-        try:
+        with located(f"{dotted}: "):
             declared = find_key(owner, dotted)
-        except InputError as error:
-            raise InputError(f"{dotted}: {error}") from None
         parsed[tuple(dotted.split("."))] = parse_field(declared, value, dotted)
     result: T = _replaced(owner, parsed, ())
     return result

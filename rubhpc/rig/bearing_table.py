@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from rubhpc.errors import InputError
 from rubhpc.input.fields import FieldError, choice, count, series
 from rubhpc.rig.parts import Bearing
-from rubhpc.rig.supports import Support
+from rubhpc.rig.supports import Support, check_pairs
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -20,6 +20,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 PAIRS = ("yy", "yz", "zy", "zz")
+_EXAMPLES = {"N/m": "[2e7, 1.5e7, 1.2e7]", "N s/m": "[8e4, 3e4, 1e4]"}
+
+
+def _column(unit: str, doc: str) -> Any:
+    return series(unit, doc=doc, example=_EXAMPLES[unit], default=None)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,42 +62,20 @@ class BearingTable(Support):
     speed: tuple[float, ...] = series(
         "rad/s", doc="Speeds of the table, rising.", example='["500 rpm", "2000 rpm", "6000 rpm"]', at_least=0
     )
-    stiffness: tuple[float, ...] | None = series(
-        "N/m",
-        doc="Stiffness in both lateral directions, in place of kyy, kzz, kyz and kzy.",
-        example="[2e7, 1.5e7, 1.2e7]",
-        default=None,
+    stiffness: tuple[float, ...] | None = _column(
+        "N/m", "Stiffness in both lateral directions, in place of kyy, kzz, kyz and kzy."
     )
-    kyy: tuple[float, ...] | None = series(
-        "N/m", doc="Vertical stiffness.", example="[2e7, 1.5e7, 1.2e7]", default=None
+    kyy: tuple[float, ...] | None = _column("N/m", "Vertical stiffness.")
+    kzz: tuple[float, ...] | None = _column("N/m", "Horizontal stiffness.")
+    kyz: tuple[float, ...] | None = _column("N/m", "Vertical force per horizontal displacement.")
+    kzy: tuple[float, ...] | None = _column("N/m", "Horizontal force per vertical displacement.")
+    damping: tuple[float, ...] | None = _column(
+        "N s/m", "Damping in both lateral directions, in place of cyy, czz, cyz and czy."
     )
-    kzz: tuple[float, ...] | None = series(
-        "N/m", doc="Horizontal stiffness.", example="[2e7, 1.5e7, 1.2e7]", default=None
-    )
-    kyz: tuple[float, ...] | None = series(
-        "N/m", doc="Vertical force per horizontal displacement.", example="[2e7, 1.5e7, 1.2e7]", default=None
-    )
-    kzy: tuple[float, ...] | None = series(
-        "N/m", doc="Horizontal force per vertical displacement.", example="[2e7, 1.5e7, 1.2e7]", default=None
-    )
-    damping: tuple[float, ...] | None = series(
-        "N s/m",
-        doc="Damping in both lateral directions, in place of cyy, czz, cyz and czy.",
-        example="[8e4, 3e4, 1e4]",
-        default=None,
-    )
-    cyy: tuple[float, ...] | None = series(
-        "N s/m", doc="Vertical damping.", example="[8e4, 3e4, 1e4]", default=None
-    )
-    czz: tuple[float, ...] | None = series(
-        "N s/m", doc="Horizontal damping.", example="[8e4, 3e4, 1e4]", default=None
-    )
-    cyz: tuple[float, ...] | None = series(
-        "N s/m", doc="Vertical force per horizontal velocity.", example="[8e4, 3e4, 1e4]", default=None
-    )
-    czy: tuple[float, ...] | None = series(
-        "N s/m", doc="Horizontal force per vertical velocity.", example="[8e4, 3e4, 1e4]", default=None
-    )
+    cyy: tuple[float, ...] | None = _column("N s/m", "Vertical damping.")
+    czz: tuple[float, ...] | None = _column("N s/m", "Horizontal damping.")
+    cyz: tuple[float, ...] | None = _column("N s/m", "Vertical force per horizontal velocity.")
+    czy: tuple[float, ...] | None = _column("N s/m", "Horizontal force per vertical velocity.")
     eccentricity_y: tuple[float, ...] | None = series(
         "m",
         doc="Vertical static position of the journal in the film, under the loads; up is positive.",
@@ -132,10 +115,7 @@ class BearingTable(Support):
                 problem = f"{len(values)} values for {len(self.speed)} speeds"
                 raise FieldError(declared.name, f"{problem}; give one for each speed, or a single number")
         for one, letter in (("stiffness", "k"), ("damping", "c")):
-            pairs = [f"{letter}{pair}" for pair in PAIRS]
-            for key in pairs:
-                if getattr(self, key) is not None and getattr(self, one) is not None:
-                    raise FieldError(key, f"conflicts with {one}; give either {one} or {', '.join(pairs)}")
+            check_pairs(self, one, tuple(f"{letter}{pair}" for pair in PAIRS))
         if self.stiffness is None and (self.kyy is None or self.kzz is None):
             key = "kyy" if self.kyy is None else "kzz"
             raise FieldError(key, "missing; a table has either stiffness, or kyy and kzz")

@@ -78,15 +78,10 @@ def rig_from_dict(table: Mapping[str, Any], where: str = "rig") -> Rig:
     return build(Rig, table, where).with_geometry(ABSENT["geometry"])
 
 
-def packaged_rigs() -> list[str]:
-    """Return the names of the packaged rigs."""
-    return list(_packaged_names())
-
-
 def packaged_name(name_or_path: str | PathLike[str]) -> str | None:
     """Return the name of a packaged rig; None of a file or a function."""
     name = str(name_or_path)
-    return name if name in _packaged_names() else None
+    return name if name in packaged_rigs() else None
 
 
 def read_rig(
@@ -137,8 +132,8 @@ def read_rig(
 
 
 @cache
-def _packaged_names() -> tuple[str, ...]:
-    """Names of the packaged rigs, found once."""
+def packaged_rigs() -> tuple[str, ...]:
+    """Return the names of the packaged rigs, found once."""
     return tuple(sorted(p.stem for p in PACKAGED.glob("*.toml")))
 
 

@@ -53,7 +53,7 @@ class Masses:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        _check_pairs(self, "mass", ("myy", "mzz"))
+        check_pairs(self, "mass", ("myy", "mzz"))
 
     @property
     def mass_matrix(self) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -112,7 +112,7 @@ class Springs(Masses):
     def __post_init__(self) -> None:
         super().__post_init__()
         for one, letter in (("stiffness", "k"), ("damping", "c")):
-            _check_pairs(self, one, (f"{letter}yy", f"{letter}zz", f"{letter}yz", f"{letter}zy"))
+            check_pairs(self, one, (f"{letter}yy", f"{letter}zz", f"{letter}yz", f"{letter}zy"))
         if self.stiffness is None and (self.kyy is None or self.kzz is None):
             key = "kyy" if self.kyy is None else "kzz"
             raise FieldError(key, "missing; give either stiffness, or kyy and kzz")
@@ -194,7 +194,7 @@ def is_time(until: float) -> bool:
     return getattr(until, "unit", "") == "s"
 
 
-def _check_pairs(owner: Masses, one: str, pairs: tuple[str, ...]) -> None:
+def check_pairs(owner: Masses, one: str, pairs: tuple[str, ...]) -> None:
     """Refuse a value for both directions together with those of single ones."""
     for key in pairs:
         if getattr(owner, one) is not None and getattr(owner, key) not in (None, 0.0):

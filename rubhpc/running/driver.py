@@ -153,7 +153,7 @@ def _run_in(
 
     with ended_together(pool, logs), stopping as watch, ExitStack() as held:
         watch.forward_to(pool.stop)
-        held.enter_context(announced_by(_say if pool.rank == 0 and not quiet else _say_nothing))
+        held.enter_context(announced_by(_say if pool.rank == 0 and not quiet else lambda _: None))
         resolved = pool.from_first(resolve)
         watch.watch(resolved.output / "STOP", resolved.run.time_limit)
         request = RunRequest(
@@ -170,10 +170,6 @@ def _run_in(
 
 def _say(text: str) -> None:
     print(text, flush=True)
-
-
-def _say_nothing(text: str) -> None:
-    pass
 
 
 def _run(request: RunRequest, pool: Pool) -> Summary:

@@ -94,11 +94,6 @@ class Plan:
     n_expected: int | None = None
 
     @property
-    def core_hours(self) -> float:
-        """Time for what is missing."""
-        return self.time.seconds / 3600.0
-
-    @property
     def _n_shard(self) -> int:
         """Files of an array of the finished store if blocks are packed; 0 otherwise."""
         manifest = self.manifest

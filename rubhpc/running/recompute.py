@@ -11,7 +11,7 @@ from rubhpc.errors import InputError, RubError, StoreError
 from rubhpc.integrate.record import Record, State
 from rubhpc.running.case_setup import set_up
 from rubhpc.running.initial_states import is_intact
-from rubhpc.running.worker import integrate, packed_measures, put_any
+from rubhpc.running.worker import integrate, packed_measures, put
 from rubhpc.schema import DONE, FINAL_STATE, MISSING, STATUS
 from rubhpc.storage.measures import blank_records
 from rubhpc.storage.new_manifest import manifest_of
@@ -84,7 +84,7 @@ def reproduce(study: Study, name: str) -> Reproduction:
     try:
         record = _compute(grid, case)
         data = {v.name: np.full((1, *manifest.extent(v)), np.nan, v.dtype) for v in manifest.variables}
-        put_any(record, data, 0)
+        put(record, data, 0)
     except Exception as error:
         text = " ".join(str(error).split())
         raise RubError(f"case {case.id}, {at}: {type(error).__name__}: {text}") from error

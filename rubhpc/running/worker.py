@@ -48,22 +48,17 @@ if TYPE_CHECKING:
     Arrays = dict[str, NDArray[Any]]
 
 
-def put_any(record: Record | BranchRecord | RunUpRecord, data: Arrays, i_case: int) -> None:
-    """Put the arrays of a record into those of a block."""
-    if isinstance(record, BranchRecord | RunUpRecord):
-        put_points(record, data, i_case)
-    else:
-        put(record, data, i_case)
-
-
-def put(record: Record, data: Arrays, i_case: int) -> None:
+def put(record: Record | BranchRecord | RunUpRecord, data: Arrays, i_case: int) -> None:
     """Put the arrays of a record that is done into those of a block.
 
     Raises
     ------
     FloatingPointError
-        One of them is not finite.
+        One of them is not finite, at a speed.
     """
+    if isinstance(record, BranchRecord | RunUpRecord):
+        _put_points(record, data, i_case)
+        return
     if record.status != DONE:
         return
     arrays = {**record.signals, **record.spectra, **record.sections}
@@ -75,7 +70,7 @@ def put(record: Record, data: Arrays, i_case: int) -> None:
         values[i_case] = arrays[name]
 
 
-def put_points(record: BranchRecord | RunUpRecord, data: Arrays, i_case: int) -> None:
+def _put_points(record: BranchRecord | RunUpRecord, data: Arrays, i_case: int) -> None:
     """Put the points of branches, or the revolutions and samples of a run-up, into the arrays of a block."""
     for name, values in data.items():
         values[i_case] = np.nan
@@ -269,7 +264,7 @@ class Worker:
                 try_apart(self.grid.study, case, start.state, self._check(PATIENCE))
                 self.watch.begin(flat, case.id)
             record = record_of(self.grid, case, self._setups, start.state, self._check(), self.say)
-            put_any(record, data, i_case)
+            put(record, data, i_case)
             measures = packed_measures(record, self._record_type).tobytes()
         except Stopped:
             raise
@@ -332,28 +327,11 @@ def integrate(
     note: Callable[[float], None] = lambda _: None,
 ) -> Record | RunUpRecord:
     """The record of a case, at its speed or over its speeds; `check` is called several times a second."""
+    keys: Any = {"clearance": case.clearance, "friction": case.friction, "recording": study.recording}
+    keys |= {"initial": initial, "check": check, "say": say, "note": note}
     if case.speed_law is None:
-        return run_case(
-            setup,
-            clearance=case.clearance,
-            friction=case.friction,
-            recording=study.recording,
-            initial=initial,
-            check=check,
-            say=say,
-            note=note,
-        )
-    return record_run_up(
-        setup,
-        case.speed_law,
-        clearance=case.clearance,
-        friction=case.friction,
-        recording=study.recording,
-        initial=initial,
-        check=check,
-        say=say,
-        note=note,
-    )
+        return run_case(setup, **keys)
+    return record_run_up(setup, case.speed_law, **keys)
 
 
 def _reason(error: Exception) -> str:

@@ -6,7 +6,7 @@ import re
 from dataclasses import Field, replace
 from typing import TYPE_CHECKING, Any
 
-from rubhpc.errors import InputError
+from rubhpc.errors import InputError, located
 from rubhpc.input.fields import check_value, parse_field
 from rubhpc.input.messages import brief, nearest, place
 from rubhpc.input.quantity import MOST_VALUES, RANGE_KEYS, read_ends, read_range
@@ -150,10 +150,8 @@ def declared_axis(name: str, rig: Rig, where: str) -> Field[Any]:
         known = [axis for axis in OWN if axis.startswith((RUN_UP_PREFIX, DRIVE_PREFIX))]
         raise InputError(f"{where}: unknown axis; {nearest(name, known)}")
     if is_of_table(name):
-        try:
+        with located(f"{where}: "):
             return contact_field(name) if name.startswith(contact_axes.PREFIX) else initial_field(name)
-        except InputError as error:
-            raise InputError(f"{where}: {error}") from None
     try:
         declared = find_key(rig, name)
     except InputError as error:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from rubhpc.errors import InputError
@@ -84,14 +84,7 @@ def branch_axis(name: str, values: object, rig: Rig, file: str) -> Axis:
     if not isinstance(values, dict) or set(values) != {"start", "stop"}:
         raise InputError(f"{where}: [branch] follows it; write it as {{ start = ..., stop = ... }}")
     found = make_range(name, values, rig, file)
-    return Axis(
-        name=found.name,
-        dimension=found.dimension,
-        unit=found.unit,
-        values=found.values[:1],
-        long_name=found.long_name,
-        drawn_from=found.drawn_from,
-    )
+    return replace(found, values=found.values[:1])
 
 
 def check_followed(along: str, where: str) -> None:
@@ -107,17 +100,16 @@ def check_branch(
     axes: Sequence[Axis],
     integrator: Integrator,
     recording: Recording,
-    *,
-    is_sampled: bool,
+    others: Sequence[str],
 ) -> None:
-    """Refuse what cannot be followed."""
+    """Refuse what cannot be followed; `others` are tables that leave no room for branches."""
+    for other in others:
+        raise InputError(f"[branch] along: a study with [{other}] has no axis to follow; remove one of them")
     check_followed(keys.along, "[branch] along")
     if all(axis.name != keys.along for axis in axes):
         raise InputError(
             f"[branch] along: {keys.along} is not an axis of the grid; add it as {{ start, stop }}"
         )
-    if is_sampled:
-        raise InputError("[branch] along: a sample has no axis to follow; remove [sample] or [branch]")
     if any(axis.sweep != FROM_REST for axis in axes):
         raise InputError("[branch] along: branches need no sweep; remove sweep from the axes")
     if integrator.method != "modal":

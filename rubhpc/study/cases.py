@@ -9,13 +9,12 @@ import hashlib
 import itertools
 import json
 import math
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.errors import InputError
+from rubhpc.errors import InputError, located
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.model import state_size
 from rubhpc.fem.response import check_response_node
@@ -34,6 +33,7 @@ from rubhpc.study.warnings import decay_of, warnings_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
+    from contextlib import AbstractContextManager
 
     from numpy.typing import NDArray
 
@@ -395,15 +395,9 @@ def _evenly(n: int, most: int) -> int:
     return -(-n // n_block)
 
 
-@contextmanager
-def _named(study: Study) -> Iterator[None]:
-    """Prefix an InputError with the study's file."""
-    try:
-        yield
-    except InputError as error:
-        if study.source is None:
-            raise
-        raise InputError(f"{place(str(study.source))}: {error}") from None
+def _named(study: Study) -> AbstractContextManager[None]:
+    """Put the study's file before an InputError."""
+    return located("" if study.source is None else f"{place(str(study.source))}: ")
 
 
 _EVENT_STEPS = 60  # that the modal scheme takes a revolution, samples apart

@@ -9,7 +9,7 @@ import itertools
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any, Protocol
 
-from rubhpc.errors import InputError
+from rubhpc.errors import InputError, located
 from rubhpc.input.messages import nearest
 from rubhpc.study.contact_keys import NEEDS_LAW, Contact, ContactKeys
 
@@ -106,11 +106,9 @@ def check_contacts(stated: ContactKeys, axes: Sequence[Tried]) -> list[Contact]:
     ends = [axis.tried if choices_of(axis.name) else (min(axis.tried), max(axis.tried)) for axis in axes]
     for values in itertools.product(*ends):
         at = {axis.name: value for axis, value in zip(axes, values, strict=True)}
-        try:
+        where = ", ".join(f"{name} = {_word(name, value)}" for name, value in at.items())
+        with located(f"[grid] {where}: [contact] " if at else "[contact] "):
             found.append(contact_at(stated, at))
-        except InputError as error:
-            where = ", ".join(f"{name} = {_word(name, value)}" for name, value in at.items())
-            raise InputError(f"[grid] {where}: [contact] {error}" if at else f"[contact] {error}") from None
     for key, value in asdict(stated).items():
         if value is not None and all(getattr(contact, key) is None for contact in found):
             kind, laws, _ = NEEDS_LAW[key]

@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rubhpc.errors import InputError
+from rubhpc.errors import InputError, located
 from rubhpc.input.fields import FieldError, check_fields, count, quantity, series
 from rubhpc.study.axes import DRIVE_AXES, DRIVE_PREFIX
 from rubhpc.study.drive_law import DriveLaw
@@ -149,17 +149,8 @@ def check_drive(
             raise InputError("[drive] speed: goes with a table of torques, not with an axis; leave it out")
         if key == "start":
             for start in axis.tried:
-                _tried(keys, {"start": start} | ({"torque": 0.0} if keys.torque is None else {}), name)
+                with located(f"[grid] {name}: {start:g} rad/s: [drive] "):
+                    keys.law_at({"start": start} | ({"torque": 0.0} if keys.torque is None else {}))
     given = {name.removeprefix(DRIVE_PREFIX): axis.tried[0] for name, axis in varied.items()}
-    try:
+    with located("[drive] "):
         keys.law_at(given)
-    except FieldError as error:
-        raise error.within("", "drive") from None
-
-
-def _tried(keys: DriveKeys, given: Mapping[str, float], axis: str) -> None:
-    """Refuse a value of an axis by which the case could not begin."""
-    try:
-        keys.law_at(given)
-    except FieldError as error:
-        raise InputError(f"[grid] {axis}: {given['start']:g} rad/s: [drive] {error}") from None

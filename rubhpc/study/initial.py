@@ -6,7 +6,7 @@ import itertools
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any
 
-from rubhpc.errors import InputError
+from rubhpc.errors import InputError, located
 from rubhpc.input.fields import FieldError, check_fields, count, quantity, selection, text
 from rubhpc.input.messages import nearest
 from rubhpc.study.stored_state import StoredState  # noqa: TC001 - annotations are read when a table is built
@@ -136,8 +136,6 @@ def check_initials(stated: Initial, axes: Sequence[Tried]) -> None:
     ends = [(min(axis.tried), max(axis.tried)) for axis in axes]
     for values in itertools.product(*ends):
         at = {axis.name: value for axis, value in zip(axes, values, strict=True)}
-        try:
+        where = ", ".join(f"{name} = {value:g}" for name, value in at.items())
+        with located(f"[grid] {where}: "):
             initial_at(stated, at)
-        except InputError as error:
-            where = ", ".join(f"{name} = {value:g}" for name, value in at.items())
-            raise InputError(f"[grid] {where}: {error}") from None

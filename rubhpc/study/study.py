@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rubhpc.errors import InputError
+from rubhpc.errors import InputError, located
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.probes import with_probes
 from rubhpc.input.messages import brief, nearest, place, quoted
@@ -70,21 +70,11 @@ def table_of(table: dict[str, Any], key: str, file: str) -> dict[str, Any]:
 
 def overridden(rig: Rig, table: dict[str, Any], file: str) -> Rig:
     """The rig with the values of [override]."""
-    try:
+    with located(f"{place(file, 'override')} "):
         return with_keys(rig, dict(flatten(table)))
-    except InputError as error:
-        raise InputError(f"{place(file, 'override')} {error}") from None
 
 
-def read_branch(
-    table: dict[str, Any],
-    grid: dict[str, Any],
-    rig: Rig,
-    sample: Sample | None,
-    file: str,
-    *,
-    is_refined: bool,
-) -> BranchKeys:
+def read_branch(table: dict[str, Any], grid: dict[str, Any], rig: Rig, file: str) -> BranchKeys:
     """Return the table [branch], its step in the unit of its axis."""
     along, step = table.get("along"), table.get("step")
     axes = dict(flatten(grid))
@@ -92,11 +82,6 @@ def read_branch(
         meant = nearest(along, axes)
         fix = meant if meant.startswith("did") else "add it as { start, stop }"
         raise InputError(f"{place(file, 'branch', 'along')}: {along} is not an axis of the grid; {fix}")
-    if sample is not None:
-        fix = "a sample has no axis to follow; remove [sample] or [branch]"
-        raise InputError(f"{place(file, 'branch')}: {fix}")
-    if is_refined:
-        raise InputError(f"{place(file, 'branch')}: branches are not refined; remove [refine] or [branch]")
     if isinstance(along, str) and isinstance(step, str):
         where = place(file, "branch", "step")
         try:
@@ -123,10 +108,8 @@ def read_axes(
             (branch_axis if name == along else make_axis)(name, values, rig, file) for name, values in pairs
         )
     axes = [(make_range if isinstance(v, dict) else make_axis)(name, v, rig, file) for name, v in pairs]
-    try:
+    with located(f"{place(file)}: "):
         return draw(axes, sample, rig)
-    except InputError as error:
-        raise InputError(f"{place(file)}: {error}") from None
 
 
 # Names that a store takes for itself; an axis `clearance` is the very setting of that name.
@@ -184,13 +167,9 @@ def check_rigs(rig: Rig, axes: tuple[Axis, ...], probes: tuple[Probe, ...] = ())
         )
     for values in grid:
         case = dict(zip(names, values, strict=True))
-        try:
+        where = ", ".join(f"{name} = {value:g}" for name, value in case.items())
+        with located(f"[grid] {where}: invalid rig: " if case else ""):
             _check_rig(with_keys(rig, case), axes)
-        except InputError as error:
-            if not case:
-                raise
-            values_text = ", ".join(f"{name} = {value:g}" for name, value in case.items())
-            raise InputError(f"[grid] {values_text}: invalid rig: {error}") from None
     if probes:  # of the first rig, since each is assembled for it
         chosen = with_keys(rig, {axis.name: axis.tried[0] for axis in rig_axes})
         model = assemble(chosen)
@@ -314,13 +293,8 @@ class Study:
         contacts = check_contacts(self.contact, [axis for axis in self.axes if axis.is_contact_key])
         check_initials(self.initial, [axis for axis in self.axes if axis.is_initial_key])
         if self.branch is not None:
-            check_branch(
-                self.branch,
-                self.axes,
-                self.integrator,
-                self.recording,
-                is_sampled=self.sample is not None,
-            )
+            beside = [name for name in ("sample", "refine") if getattr(self, name) is not None]
+            check_branch(self.branch, self.axes, self.integrator, self.recording, beside)
         check_rigs(self.rig, self.axes, self.recording.probe)
         for contact in contacts:
             check_method(contact, self.integrator, is_bent=self.has_bent_stator, stators=self._freest_stators)
@@ -381,10 +355,6 @@ class Study:
         }
 
 
-def _values(axis: Axis) -> list[str | float]:
-    return [*(axis.words or axis.values)]
-
-
 def read_study(
     path: str | PathLike[str], output: str | PathLike[str] | None = None, *, trust_rig: bool = False
 ) -> Study:
@@ -432,26 +402,19 @@ def study_of(
         line_of_text(table, "rig", "", file), source.parent, place(file, "", "rig"), trust_rig=trust_rig
     )
     rig = overridden(rig, table_of(table, "override", file), file)
-    sample = build(Sample, table["sample"], file, "sample") if "sample" in table else None
-    refine = build(Refine, table["refine"], file, "refine") if "refine" in table else None
+    kinds = {"sample": Sample, "refine": Refine, "run_up": RunUpKeys, "drive": DriveKeys}
+    given: Any = {name: build(kinds[name], table[name], file, name) for name in kinds if name in table}
+    sample, run_up, drive = given.get("sample"), given.get("run_up"), given.get("drive")
     grid = table_of(table, "grid", file)
-    branch = None
-    if "branch" in table:
-        branch = read_branch(
-            table_of(table, "branch", file), grid, rig, sample, file, is_refined=refine is not None
-        )
-    run_up = build(RunUpKeys, table["run_up"], file, "run_up") if "run_up" in table else None
-    drive = build(DriveKeys, table["drive"], file, "drive") if "drive" in table else None
+    branch = read_branch(table_of(table, "branch", file), grid, rig, file) if "branch" in table else None
     axes = read_axes(grid, rig, sample, file, branch.along if branch else "")
-    try:
+    with located(f"{place(file)}: "):
         if run_up is not None:
             refuse_speeds("run_up", [axis.name for axis in axes])
             axes = (*axes, speed_axis(run_up.highest, "highest spin speed"))
         elif drive is not None:
             refuse_speeds("drive", [axis.name for axis in axes])
             axes = (*axes, speed_axis(first_speed(drive, axes), "first spin speed"))
-    except InputError as error:
-        raise InputError(f"{place(file)}: {error}") from None
     for name in {axis.name for axis in axes} & dict(flatten(table.get("override", {}))).keys():
         raise InputError(f"{place(file, 'override', name)}: is also an axis of the grid; remove one")
     for name in ("contact", "initial"):
@@ -465,16 +428,13 @@ def study_of(
     integrator = build(Integrator, table.get("integrator", {}), file, "integrator")
     recording = build(Recording, table.get("record", {}), file, "record")
     run = build(Run, table.get("run", {}), file, "run")
-    try:
+    with located(f"{place(file)}: "):
         return Study(
             title=title,
             rig=rig,
             axes=axes,
-            sample=sample,
-            refine=refine,
             branch=branch,
-            run_up=run_up,
-            drive=drive,
+            **given,
             contact=contact,
             initial=initial,
             integrator=integrator,
@@ -483,5 +443,3 @@ def study_of(
             output=Path(store),
             source=source,
         )
-    except InputError as error:
-        raise InputError(f"{place(file)}: {error}") from None

@@ -8,21 +8,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 import xarray as xr
-from click.testing import CliRunner
 from matplotlib.figure import Figure
+from printing import printed
 from SALib.analyze import sobol as sobol_estimate
 from SALib.sample import sobol as sobol_sample
 from SALib.test_functions import Ishigami
 
 from postproc.cases.sensitivity import MOST_FILLED, sensitivity
 from postproc.cases.sobol import grid_indices
-from postproc.catalogue import figures
 from postproc.figures.sensitivity import draw_bars
-from rubhpc.commands.figures import figure_command
 from rubhpc.errors import InputError
 from rubhpc.schema import DIVERGED, DONE, FAILED
-
-COMMAND = figure_command(figures()["sensitivity"])
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -239,8 +235,7 @@ def test_command_shows_draws_and_writes(tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.chdir(tmp_path)
     without(sines(8), share=0.05).to_zarr("study.zarr", zarr_format=3, consolidated=False)
     words = ["study.zarr", "--measure", "peak_contact_force", "--select", "stator=2", "--draws", "20"]
-    done = CliRunner().invoke(COMMAND, [*words, "--data", "shares.json"], catch_exceptions=False)
-    lines = done.output.splitlines()
+    lines = printed("sensitivity", *words, "--data", "shares.json").splitlines()
     assert lines[0].startswith("peak_contact_force: mean ")
     assert lines[1] == "of 512 cases 6 missing, 5 failed, 5 diverged"
     assert lines[-2:] == ["study_sensitivity.png", "shares.json"]

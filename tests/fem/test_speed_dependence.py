@@ -17,7 +17,7 @@ from rubhpc.fem.response import (
     steady_response,
     step_limit,
 )
-from rubhpc.fem.statics import sag_at, sag_remark
+from rubhpc.fem.statics import sag_remark
 from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.rig.parts import Bearing, Damping
 from rubhpc.rig.reading import rig_from_dict
@@ -137,15 +137,15 @@ def test_journals_rest_where_their_table_has_them(spin):
     """The shaft is the line through its journals, and bends about it as on pins."""
     model = model_at(assemble(pinned()), spin)
     left = FILM.eccentricity(spin)
-    assert [sag_at(model.rotor, model.sag, node) for node in (1, 5)] == [
+    assert [model.rotor.at_node(node, model.sag) for node in (1, 5)] == [
         pytest.approx(tuple(left), rel=1e-9),
         pytest.approx((-20e-6, 5e-6), rel=1e-9),
     ]
     stiff = tuple(Bearing(node=node, stiffness=1e13) for node in (1, 5))
     pins = assemble(replace(pinned(), rotor=replace(pinned().rotor, bearing=stiff)))
-    bent = sag_at(pins.rotor, pins.sag, 3)
+    bent = pins.rotor.at_node(3, pins.sag)
     line = 0.5 * (left + np.array([-20e-6, 5e-6]))
-    assert sag_at(model.rotor, model.sag, 3) == pytest.approx(tuple(line + bent), rel=1e-5)
+    assert model.rotor.at_node(3, model.sag) == pytest.approx(tuple(line + bent), rel=1e-5)
     assert model.sag == pytest.approx(
         np.linalg.solve(model.rotor.stiffness, model.load + model.film), rel=1e-9
     )
@@ -159,7 +159,7 @@ def test_probes_feel_the_weight_on_journals_in_films(method):
     case = {"speed": SPIN, "clearance": "5 mm", "transient": 0, "revolutions": 1, "method": method}
     record = simulate(rig, **case, probes=probes)
     model = model_at(assemble(rig), SPIN)
-    up, across = sag_at(model.rotor, model.sag, 3)
+    up, across = model.rotor.at_node(3, model.sag)
     assert record.vertical == pytest.approx(np.full(256, up), rel=1e-9)
     assert record.horizontal == pytest.approx(np.full(256, across), rel=1e-9)
     weight = model.load[[name == "v" for _, name in model.rotor.degrees]].sum()
@@ -172,7 +172,7 @@ def test_a_run_up_follows_the_journals():
     probe = {"name": "at_1", "node": 1, "quantity": "bearing_force"}
     passage = run_up(rig, start=90.0, stop=300.0, time="4 s", clearance="5 mm", probes=[probe])
     speeds, model = passage.speed.values, assemble(rig)
-    known = np.array([sag_at(model.rotor, model_at(model, speed).sag, 3) for speed in speeds])
+    known = np.array([model.rotor.at_node(3, model_at(model, speed).sag) for speed in speeds])
     for name, at in zip(("vertical", "horizontal"), known.T, strict=True):
         mean = passage[name].values.reshape(len(speeds), -1).mean(axis=1)
         assert mean == pytest.approx(at, abs=0.01 * np.ptp(at)), name
@@ -215,7 +215,7 @@ def test_a_journal_is_placed_relative_to_its_pedestal():
         rotor["bearing"] = [{"node": node, **film, **pedestal} for node in (1, 3)]
         rig = rig_from_dict({"name": "journals", "rotor": rotor, "stator": []}, "journals")
         model = model_at(assemble(rig), 300.0)
-        seen.append(sag_at(model.rotor, model.sag, 1))
+        seen.append(model.rotor.at_node(1, model.sag))
     weight = (7800.0 * np.pi / 4 * 0.05**2 + 2.0) * 9.81  # with the pedestals
     assert seen[0] == pytest.approx((-2e-5, 1e-5))
     assert seen[1] == pytest.approx((-2e-5 - weight / 2 / 1e7, 1e-5), rel=1e-6)

@@ -4,21 +4,17 @@ import numpy as np
 import pytest
 import synthetic_store
 import xarray as xr
-from click.testing import CliRunner
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
+from printing import printed
 
-from postproc.catalogue import figures
 from postproc.figures.bifurcation import default_axis, draw_bifurcation, draw_simulated
 from postproc.figures.palette import REGIME_COLORS
 from postproc.signals.sections import sections_along
 from postproc.store.open import open_store
 from postproc.store.select import select
-from rubhpc.commands.figures import figure_command
 from rubhpc.errors import InputError
 from rubhpc.schema import DIVERGED, DONE, REGIME
-
-COMMAND = figure_command(figures()["bifurcation"])
 
 CHOICE = {"clearance": "84 um", "friction": 0.3, "stator.youngs_modulus": "30 GPa"}
 SPEEDS = synthetic_store.AXES["speed_ratio"][2]
@@ -147,7 +143,7 @@ def test_command_takes_the_first_of_other_axes_and_writes_the_points(synthetic_p
     monkeypatch.chdir(tmp_path)
     args = [str(synthetic_path), "--along", "clearance", "--color", "period", "--data", "points.csv"]
     args += ["--select", "speed_ratio=1.5", "--signal", "torsion"]
-    said = CliRunner().invoke(COMMAND, args, catch_exceptions=False).output.splitlines()
+    said = printed("bifurcation", *args).splitlines()
     assert "friction = 0.1: the first of 2; change with --select friction=VALUE" in said
     assert said[-2:] == ["study_bifurcation.png", "points.csv"]
     table = np.genfromtxt("points.csv", delimiter=",", names=True, deletechars="")

@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 import synthetic_store
 import xarray as xr
-from click.testing import CliRunner
+from printing import printed
 
 from postproc.catalogue import figures
 from postproc.store.open import open_store
 from postproc.store.select import select
-from rubhpc.commands.figures import figure_command
 from rubhpc.errors import InputError
 
 CLEARANCE, FRICTION, MODULUS = "clearance=84 um", "friction=0.3", "stator.youngs_modulus=3 GPa"
@@ -31,15 +30,7 @@ ONE = options("speed_ratio=1.5", CLEARANCE, FRICTION, MODULUS)
 @pytest.fixture
 def run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-
-    def invoke(name, *args):
-        return (
-            CliRunner()
-            .invoke(figure_command(figures()[name]), [str(word) for word in args], catch_exceptions=False)
-            .output
-        )
-
-    return invoke
+    return printed
 
 
 @pytest.mark.parametrize(

@@ -6,20 +6,16 @@ import numpy as np
 import pytest
 import synthetic_store
 import xarray as xr
-from click.testing import CliRunner
+from printing import printed
 
 from postproc.cases.maps import default_axes, facet_axes, map_data
-from postproc.catalogue import figures
 from postproc.figures.drawing import house_style, new_figure
 from postproc.figures.map import map as draw_map
 from postproc.figures.map import value_maps
 from postproc.figures.small_multiples import name_facets
 from postproc.store.open import open_store
-from rubhpc.commands.figures import figure_command
 from rubhpc.errors import InputError
 from rubhpc.schema import FAILED
-
-COMMAND = figure_command(figures()["map"])
 
 FACETS = ["stator_youngs_modulus", "friction"]  # down, across
 
@@ -101,7 +97,7 @@ def test_facets_are_other_axes_of_few_values(synthetic_path):
 def test_command_draws_a_panel_for_each_value(synthetic_path, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     args = [str(synthetic_path), "--facet", "friction", "--contours", "3", "--log", "--data", "map.csv"]
-    said = CliRunner().invoke(COMMAND, args, catch_exceptions=False).output.splitlines()
+    said = printed("map", *args).splitlines()
     assert said[0].startswith("stator_youngs_modulus = 3 GPa: the first of 2")
     assert said[-2:] == ["study_map.png", "map.csv"]
     table = np.genfromtxt("map.csv", delimiter=",", names=True, deletechars="")

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 import synthetic_store
-from click.testing import CliRunner
+from printing import printed
 from unpacking import unpacked_floats, unpacked_record
 
 from postproc.cases.maps import validity
@@ -278,9 +278,7 @@ def test_the_command_writes_the_page_and_says_what_is_on_it(
     two_stator_path: Path, tmp_path: Path, monkeypatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    said = (
-        CliRunner().invoke(report, [str(two_stator_path), "--limit", "3 MB"], catch_exceptions=False).output
-    )
+    said = printed(report, two_stator_path, "--limit", "3 MB")
     assert said.startswith("study.html (")
     assert "all cases with a result" in said
     assert (tmp_path / "study.html").is_file()
@@ -300,7 +298,7 @@ def test_wrong_input_is_one_line(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InputError) as refusal:
-        CliRunner().invoke(report, [str(two_stator_path), *args], catch_exceptions=False)
+        printed(report, two_stator_path, *args)
     assert message in str(refusal.value)
     assert list(tmp_path.iterdir()) == []
 

@@ -20,7 +20,7 @@ def rig():
 
 
 def test_the_packaged_rig_is_the_papers(rig):
-    assert packaged_rigs() == ["mokhtar2017"]
+    assert packaged_rigs() == ("mokhtar2017",)
     assert rig.rotor.n_node == 15
     assert rig.rotor.disc[0].inertia[0] == pytest.approx(2.646, abs=5e-4)  # kg
     unbalance = rig.rotor.unbalance[0]

@@ -184,7 +184,11 @@ def test_multipliers_are_drawn(store):
             '[integrator]\nmethod = "central-difference"\n[record]',
             "branches need .integrator. method",
         ),
-        ("[record]", "[sample]\nn = 8\n[record]", "a sample has no axis to follow"),
+        (
+            "friction = 0.3",
+            "friction = { start = 0.1, stop = 0.3 }\n[sample]\nn = 8",
+            r"a study with \[sample\] has no axis to follow; remove one",
+        ),
         ("[0.74, 0.75]", '{ values = [0.74, 0.75], sweep = "up" }', "branches need no sweep"),
         ("[record]", "[record]\nlyapunov = 2", "lyapunov: branches have multipliers in its place"),
     ],

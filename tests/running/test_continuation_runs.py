@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from closed_form import simulate
-from running import array_of, stored_bytes, write_study
+from running import Killed, array_of, stored_bytes, write_study
 
 from rubhpc import State, assemble
 from rubhpc.errors import InputError, StoppedEarly, StoreError
@@ -113,10 +113,6 @@ def test_up_alone_is_the_up_of_both_and_brings_no_dimension(finished, tmp_path):
     assert mine.speed_ratio.values.tolist() == list(SPEEDS)
     for name in ("vertical", "peak_torsion", "final_state"):
         assert np.array_equal(mine[name].values, theirs[name].values)
-
-
-class Killed(BaseException):
-    """The process ends here."""
 
 
 def kill_after(n_case: int, monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:

@@ -17,7 +17,7 @@ from stub_physics import Physics, record
 
 from rubhpc.errors import InputError, RubError, StoppedEarly, StoreError
 from rubhpc.integrate.compilation import compilation
-from rubhpc.running import case_setup, computing, job, stopping, worker
+from rubhpc.running import computing, job, stopping, worker
 from rubhpc.running.case_setup import count_set_ups
 from rubhpc.running.driver import run
 from rubhpc.running.pool import Pool
@@ -44,11 +44,7 @@ if TYPE_CHECKING:
 
 @pytest.fixture
 def physics(monkeypatch: pytest.MonkeyPatch) -> Physics:
-    stub = Physics()
-    monkeypatch.setattr(case_setup, "prepare", stub.prepare)
-    monkeypatch.setattr(worker, "run_case", stub.run_case)
-    monkeypatch.setattr(job, "_warm_up", lambda *_: None)
-    return stub
+    return Physics().put_in(monkeypatch)
 
 
 @pytest.fixture
@@ -356,8 +352,7 @@ def test_what_a_killed_run_left_is_packed_when_the_next_begins(physics, study, m
     monkeypatch.undo()
     seen: list[int] = []
     physics.on_case = lambda: seen.append(int((xr.open_zarr(study.output).status == DONE).sum()))
-    monkeypatch.setattr(case_setup, "prepare", physics.prepare)
-    monkeypatch.setattr(worker, "run_case", physics.run_case)
+    physics.put_in(monkeypatch)
     run(study, quiet=True)
     assert set(seen) == {6}
 

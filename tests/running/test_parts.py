@@ -15,7 +15,6 @@ from running import killed_after, shards, start, stored_bytes, write_study
 from stub_physics import Physics, record
 
 from rubhpc.errors import InputError, StoppedEarly, StoreError
-from rubhpc.running import case_setup, job, worker
 from rubhpc.running.driver import run
 from rubhpc.running.plan import make_plan
 from rubhpc.running.sampled_cases import Estimate, Sample
@@ -46,12 +45,8 @@ class Distinct(Physics):
 
 @pytest.fixture
 def physics(monkeypatch: pytest.MonkeyPatch) -> Physics:
-    stub = Distinct()
     monkeypatch.setattr(os, "sync", lambda: None)  # no power is cut
-    monkeypatch.setattr(case_setup, "prepare", stub.prepare)
-    monkeypatch.setattr(worker, "run_case", stub.run_case)
-    monkeypatch.setattr(job, "_warm_up", lambda *_: None)
-    return stub
+    return Distinct().put_in(monkeypatch)
 
 
 def make_study(folder: Path, name: str = "parts.zarr", friction: list[float] = FRICTIONS) -> Study:
@@ -321,7 +316,7 @@ def test_status_and_plan_show_the_parts(physics, tmp_path, monkeypatch):
     monkeypatch.setattr(Sample, "set_up", 0.0)
     plans = [make_plan(study, f"{number}/4") for number in range(1, 5)]
     assert [plan.counts[MISSING] == 0 for plan in plans] == [False, True, False, False]
-    assert sum(plan.core_hours for plan in plans) == pytest.approx(make_plan(study).core_hours)
+    assert sum(plan.time.seconds for plan in plans) == pytest.approx(make_plan(study).time.seconds)
     assert "part        2/4: " in plans[1].text()
 
 

@@ -7,13 +7,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from running import shards, stored_bytes, write_study
+from running import Killed, shards, stored_bytes, write_study
 from simulated_ranks import Simulation
 from stub_physics import Physics, record
 
 from postproc.store.open import open_live, open_store
 from rubhpc.errors import InputError, StoppedEarly
-from rubhpc.running import case_setup, driver, job, refining, worker
+from rubhpc.running import driver, refining, worker
 from rubhpc.running.driver import run
 from rubhpc.running.plan import make_plan
 from rubhpc.running.stopping import Stopping
@@ -65,11 +65,7 @@ class Maps(Physics):
 
 @pytest.fixture
 def physics(monkeypatch):
-    stub = Maps()
-    monkeypatch.setattr(case_setup, "prepare", stub.prepare)
-    monkeypatch.setattr(worker, "run_case", stub.run_case)
-    monkeypatch.setattr(job, "_warm_up", lambda *_: None)
-    return stub
+    return Maps().put_in(monkeypatch)
 
 
 def study_of(folder, name="tiny", rest=REFINE, friction=FRICTION, **changes):
@@ -106,10 +102,6 @@ def test_a_run_computes_what_is_asked_and_readers_fill_the_rest(tmp_path, physic
     assert "inferred" in read_status(study.output).text()
     assert not verify(study.output)
     assert run(study, quiet=True).computed == 0
-
-
-class Killed(BaseException):
-    """The process ends here."""
 
 
 def run_with_kills(study, physics, moments):
@@ -153,9 +145,7 @@ class Islands(Maps):
 
 def test_kills_with_islands_smaller_than_the_first_step(tmp_path, physics, monkeypatch):
     """An island near an edge is met and complete, one far from all is not, however often a run is killed."""
-    islands = Islands()
-    monkeypatch.setattr(case_setup, "prepare", islands.prepare)
-    monkeypatch.setattr(worker, "run_case", islands.run_case)
+    islands = Islands().put_in(monkeypatch)
     study = study_of(tmp_path)
 
     def count_down():

@@ -1,16 +1,16 @@
 """Hilbert-Huang analysis of signals whose frequencies are known at every instant."""
 
 import math
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 import synthetic_store
 import xarray as xr
-from click.testing import CliRunner
 from closed_form import simulate
+from printing import printed
 
-from postproc.catalogue import figures
 from postproc.figures.drawing import house_style, new_figure
 from postproc.figures.hht import draw_panels, energy_time_frequency, hht
 from postproc.signals.hilbert_huang import (
@@ -23,10 +23,7 @@ from postproc.signals.hilbert_huang import (
     span_frequencies,
 )
 from postproc.store.select import select
-from rubhpc.commands.figures import figure_command
 from rubhpc.errors import InputError
-
-COMMAND = figure_command(figures()["hht"])
 
 N = 1024  # samples a revolution
 SPIN = 2 * math.pi * 25.0  # one revolution takes 40 ms
@@ -277,12 +274,8 @@ def store(tmp_path_factory):
 @pytest.fixture
 def run(store, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-
-    def invoke(*args):
-        words = [word for choice in ONE for word in ("--select", choice)]
-        return CliRunner().invoke(COMMAND, [store, *words, *args], catch_exceptions=False).output
-
-    return invoke
+    words = [word for choice in ONE for word in ("--select", choice)]
+    return partial(printed, "hht", store, *words)
 
 
 def test_the_command_shows_the_frequency_and_writes_what_it_draws(run):

@@ -5,20 +5,16 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from click.testing import CliRunner
 from closed_form import read_rig, simulate
+from printing import printed
 from scipy.stats import norm
 
 from postproc.cases.detection import TOGETHER, area_under_curve, judge
-from postproc.catalogue import figures
 from postproc.figures.drawing import house_style, new_figure
 from postproc.figures.indicators import NAMES, draw_panels
 from postproc.signals.indicators import CHANNELS, INDICATORS, indicator_scores
-from rubhpc.commands.figures import figure_command
 from rubhpc.errors import InputError
 from rubhpc.schema import DONE
-
-COMMAND = figure_command(figures()["indicators"])
 
 N, TURNS = 128, 12  # samples a revolution, revolutions
 RATE = 25.0  # Hz
@@ -305,7 +301,7 @@ def written(tmp_path, monkeypatch):
 
 def test_the_command_prints_its_table_and_writes_what_is_asked(written):
     arguments = [written, "--noise", "0.01", "--noise", "100", "--data", "rates.csv", "--scores", "scores.nc"]
-    said = CliRunner().invoke(COMMAND, arguments, catch_exceptions=False).output.splitlines()
+    said = printed("indicators", *arguments).splitlines()
     assert "of 50 cases with rub and 50 without" in said[0]
     assert said[1].split() == ["noise", *INDICATORS, TOGETHER]
     low, high = ([float(word) for word in line.split()] for line in said[2:4])
@@ -328,9 +324,9 @@ def test_the_command_reads_no_waveform_of_a_store_without_contact(tmp_path, monk
     monkeypatch.setattr("postproc.figures.indicators.indicator_scores", fail)
     store({}, np.arange(100) < 3).to_zarr(tmp_path / "free.zarr", zarr_format=3, consolidated=False)
     with pytest.raises(InputError, match="97 selected cases without contact and 3 with it are too few"):
-        CliRunner().invoke(COMMAND, [str(tmp_path / "free.zarr")], catch_exceptions=False)
+        printed("indicators", tmp_path / "free.zarr")
 
 
 def test_the_command_refuses_bad_levels(written):
     with pytest.raises(InputError, match="levels above 0"):
-        CliRunner().invoke(COMMAND, [written, "--noise", "-1"], catch_exceptions=False)
+        printed("indicators", written, "--noise", "-1")

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from functools import partial
 
 import h5py
 import numpy as np
@@ -9,7 +10,7 @@ import pandas as pd
 import pytest
 import synthetic_store
 import xarray as xr
-from click.testing import CliRunner
+from printing import printed
 
 from postproc.store.attributes import table_of
 from postproc.store.open import open_store
@@ -20,9 +21,7 @@ from rubhpc.errors import InputError
 @pytest.fixture
 def run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    return lambda *words: (
-        CliRunner().invoke(export, [str(word) for word in words], catch_exceptions=False).output
-    )
+    return partial(printed, export)
 
 
 def test_whole_store_comes_back(synthetic_path, run, tmp_path):

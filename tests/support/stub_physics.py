@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from rubhpc.integrate.record import Record
+from rubhpc.running import case_setup, job, worker
 from rubhpc.schema import DONE, SECTION_NAMES, SIGNAL_NAMES, VARIABLES, case_measures
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    import pytest
 
     from rubhpc.study.study import Recording
 
@@ -52,6 +55,13 @@ class Physics:
         self.prepared: list[float] = []
         self.poison: Callable[..., Record | None] = lambda **_: None
         self.on_case: Callable[[], None] = lambda: None
+
+    def put_in(self, monkeypatch: pytest.MonkeyPatch) -> Self:
+        """Have runs of this process take it."""
+        monkeypatch.setattr(case_setup, "prepare", self.prepare)
+        monkeypatch.setattr(worker, "run_case", self.run_case)
+        monkeypatch.setattr(job, "_warm_up", lambda *_: None)
+        return self
 
     def prepare(self, rig: Any, speed: float, **_: Any) -> SimpleNamespace:
         self.prepared.append(speed)

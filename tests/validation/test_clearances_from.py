@@ -9,7 +9,6 @@ from closed_form import read_rig, run_up, simulate
 
 from rubhpc import InputError, LumpedStator, Rig, assemble
 from rubhpc.fem.assemble import model_at
-from rubhpc.fem.statics import sag_at
 from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.rig.reading import rig_from_dict, with_keys
 from rubhpc.study.axis_reading import make_axis
@@ -73,7 +72,7 @@ def in_films(**keys):
 def test_a_rising_shaft_meets_the_upper_stator_where_the_table_says():
     """The shaft rises by 30 um at 2000 rpm, as its journals do, and by 34 um at 2200 rpm."""
     model = assemble(in_films())
-    assert [stator.centre for stator in model.stators] == [sag_at(model.rotor, model.sag, 8)] * 4
+    assert [stator.centre for stator in model.stators] == [model.rotor.at_node(8, model.sag)] * 4
     case = {"clearance": "30 um", "transient": 0, "revolutions": 2}
     assert not simulate(in_films(), speed="1999 rpm", **case).contact_force.any()
     pressed = simulate(in_films(), speed="2200 rpm", **case)
@@ -94,7 +93,7 @@ def test_a_driven_rotor_rises_too():
     model, speeds = assemble(rig), passage.speed.values
     n_free = int(passage.contact_fraction.any("stator").values.argmax())
     assert speeds[n_free] / RPM == pytest.approx(1750, abs=40)
-    known = [sag_at(model.rotor, model_at(model, speed).sag, 8)[0] for speed in speeds[:n_free]]
+    known = [model.rotor.at_node(8, model_at(model, speed).sag)[0] for speed in speeds[:n_free]]
     mean = passage.vertical.values.reshape(len(speeds), -1).mean(axis=1)[:n_free]
     assert mean == pytest.approx(known, abs=0.05 * np.ptp(known))
 
@@ -102,7 +101,7 @@ def test_a_driven_rotor_rises_too():
 def test_a_speed_of_alignment_is_that_of_the_tables():
     model = assemble(in_films(**{"rotor.clearance_from": "2000 rpm"}))
     there = model_at(model, 2000 * RPM)
-    assert [stator.centre for stator in there.stators] == [sag_at(there.rotor, there.sag, 8)] * 4
+    assert [stator.centre for stator in there.stators] == [there.rotor.at_node(8, there.sag)] * 4
     with pytest.raises(InputError, match=r"\[rotor\] clearance_from: rotor\.bearing\.1: 4000 rpm is outside"):
         assemble(in_films(**{"rotor.clearance_from": "4000 rpm"}))
 

@@ -10,13 +10,9 @@ from closed_form import Contact, read_rig, simulate
 from lone_bodies import body, set_up, set_up_modal, tip
 
 from rubhpc import State
-from rubhpc.fem.assemble import assemble
-from rubhpc.fem.response import first_lateral_frequency
 from rubhpc.integrate.case import run_case
-from rubhpc.integrate.setup import prepare
-from rubhpc.rig.reading import with_keys
 from rubhpc.schema import DIVERGED, DONE
-from rubhpc.study.study import Integrator, Recording
+from rubhpc.study.study import Recording
 
 COULOMB = Contact(friction_law="coulomb")
 PRESSED = 10.0  # N, by which the rotor's vertical spring presses it onto a stator that is held
@@ -162,19 +158,3 @@ def test_ordinary_rub_is_that_of_steady_sliding(normal):
         for name in ("vertical", "horizontal", "torsion", "stator_axial", "stator_lateral"):
             one, other = getattr(sliding, name), getattr(coulomb, name)
             assert other == pytest.approx(one, rel=0, abs=share * abs(one).max()), (name, method)
-
-
-def stiff_rub():
-    """The packaged rig with a stator of 30 GPa that slips, sticks and slips again, from rest."""
-    rig = with_keys(read_rig("mokhtar2017"), {"stator.youngs_modulus": "30 GPa"})
-    speed = 1.5 * first_lateral_frequency(assemble(rig))
-    setup = prepare(
-        rig,
-        speed,
-        contact=Contact(friction_law="coulomb"),
-        integrator=Integrator(),
-        samples_per_revolution=64,
-    )
-    recording = Recording(transient=0, revolutions=2, samples_per_revolution=64)
-    record = run_case(setup, clearance=60e-6, friction=0.6, recording=recording)
-    return record, np.array([record.vertical, record.horizontal, record.torsion, *record.stator_lateral])

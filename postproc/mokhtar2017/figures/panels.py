@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 PAGE_WIDTH = 180 / 25.4  # inches, both columns
 _PAD = 0.045  # inches about a panel, so that the labels of one keep clear of the next
+_SHOWN = 12  # revolutions of an orbit without a period
 _DOTS = 200  # an inch: what a screen shows of a page
 LABEL_WIDTH = 22  # characters left of a panel
 # Of overlaid curves, distinguishable without colour too.
@@ -108,21 +109,20 @@ def orbits(
     every: xr.Dataset,
     ax: Axes,
     over: str | None = None,
-    revolutions: int = 12,
     names: Sequence[str] | None = None,
     gap: float | None = None,
 ) -> None:
     """Draw one period of orbits over one another; a dotted line marks the gap (m) of the stator.
 
-    Of an orbit that has no period, `revolutions` are shown. `names` are those of the legend, in place of the
-    values of the axis.
+    Of an orbit without a period, twelve revolutions are shown. `names` are those of the legend, in place of
+    the values of the axis.
     """
     motion = [every[n].load() for n in ("vertical", "horizontal")]
     scale = scale_for("m", float(max(abs(signal).max() for signal in motion)))
     periods = np.atleast_1d(every["period"].values)
     for i, (name, y, z) in enumerate(overlaid("sample", *motion)):
         # One period and no more: dashes that lie over one another make a full line.
-        shown = [last_revolutions(s, int(periods[i]) or revolutions).values * scale.factor for s in (z, y)]
+        shown = [last_revolutions(s, int(periods[i]) or _SHOWN).values * scale.factor for s in (z, y)]
         is_closed = periods[i] > 0
         path = [np.append(s, s[:1]) if is_closed else s for s in shown]
         ax.plot(*path, linestyle=STYLES[i], label=names[i] if names else name)
