@@ -91,10 +91,10 @@ def _fitted(state: State, setup: Setup, clearance: float, *, is_soft: bool = Fal
             if is_found := bool(is_shut and not is_turned):
                 break
             change = turn - last
-            if last.any() and np.abs(turn).max() > SLOW * np.abs(last).max():  # Aitken's relaxation
-                share = float(
-                    np.clip(-share * np.vdot(last, change) / np.vdot(change, change), LEAST_TURN, 1.0)
-                )
+            is_slow = last.any() and change.any() and np.abs(turn).max() > SLOW * np.abs(last).max()
+            if is_slow:  # Aitken's relaxation
+                share *= -float(np.vdot(last, change) / np.vdot(change, change))
+                share = min(max(share, LEAST_TURN), 1.0)
             gap_jacobian, last = before + share * turn, turn
         rotor, *stators = setup.model.split(displacement)
         state = replace(state, rotor_displacement=rotor, stator_displacement=tuple(stators))
