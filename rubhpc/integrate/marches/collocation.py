@@ -118,6 +118,7 @@ class CollocationMarch(ModalMarch):
         self.n_step, self.sample, self._stride = 0, 0, ALL_SAMPLES
         self._take(setup)
         self._motion[:] = self.moved(setup, place)
+        shortest = self._modes.tables.first_level
         self._use_modes(setup)
         self._begin(place.contact_force)
         if place.contacts is not None:
@@ -126,8 +127,10 @@ class CollocationMarch(ModalMarch):
             self._case.lasting[:] = contacts.lasting
             self._case.since[:] = -np.round(contacts.age / self.clock.tick).astype(np.int64)
             self._memory["is_new"] = 0
-            for name in ("slot", "scale", "fastest", "unseen"):
+            for name in ("scale", "fastest", "unseen"):
                 self._memory[name] = contacts.memory[name]
+            slot = contacts.memory["slot"] + shortest - self._modes.tables.first_level
+            self._memory["slot"] = np.clip(slot, 0, self._modes.tables.is_filled.size - 1)
 
     def reached(self) -> Place:
         """Present motion and contacts, for another speed to continue from."""
@@ -187,6 +190,8 @@ class CollocationMarch(ModalMarch):
         own, self.accuracy = self.accuracy, accuracy or self.accuracy
         trail = self.new_trail(columns, n_event)
         self.trail, (samples, accumulator) = trail, self._idle
+        longest = self._modes.tangent_tables.is_filled.size - 1
+        self._memory["slot"] = np.minimum(self._memory["slot"], longest)
         outcome = PAUSED
         while outcome == PAUSED and not trail.count[TOO_MANY]:
             outcome = self._kernel(last_tick, samples, accumulator, False)
@@ -341,9 +346,10 @@ class CollocationMarch(ModalMarch):
 
     def _new_seen(self, samples: Samples, accumulator: Accumulator) -> Seen:
         signals, s = self._modes.signals, self._modes.nodes.at.size
-        if self._seen is not None:
-            before = self._seen.measured
-            if before.samples is samples and before.accumulator is accumulator:
+        if self._seen is not None and self._seen.read.size == signals.free.shape[1]:
+            measured = self._seen.measured
+            is_same = measured.samples is samples and measured.accumulator is accumulator
+            if is_same and measured.recorder is self._recorder:
                 return self._seen
             return self._seen._replace(measured=Measured(self._recorder, samples, accumulator))
         n_x = self._case.x.size
@@ -365,7 +371,7 @@ class CollocationMarch(ModalMarch):
         return advance_by_collocation(
             self._contacts,
             modes.nodes,
-            modes.tables,
+            modes.tables if self.trail is None else modes.tangent_tables,
             modes.signals,
             modes.power,
             self.clock,

@@ -616,7 +616,7 @@ def advance_by_collocation(
                         taken = max(taken, 1)  # what opens does not touch at once: such touches have no end
             else:
                 pair = -1
-            if taken == 0 and kind == FRICTION and memory.n_at_once > UNDECIDED * state.size and pair >= 0:
+            if taken == 0 and memory.n_at_once > UNDECIDED * state.size and pair >= 0:
                 taken, pair = whole, -1
             if progress.tick + taken > last_tick:
                 taken, pair = last_tick - progress.tick, -1
