@@ -107,7 +107,7 @@ _FLAGS = (
     Variable(name="regime", role="flag", dtype="int8", long_name="regime of the motion", flags=REGIME),
 )
 _RUBS = (
-    _measure("rub_kind", "1", "rub in a bore (-1: another stator)", "stator", dtype="int8", flags=RUB_KIND),
+    _measure("rub_kind", "1", "kind of rub in a bore", "stator", dtype="int8", flags=RUB_KIND),
     _measure("whirl_frequency", "rad s-1", "whirl of the contact in a bore, positive forward", "stator"),
     _measure("contact_angle_mean", "rad", "mean angle of the contact force in a bore, from up", "stator"),
     _measure("contact_angle_spread", "rad", "angular deviation of that angle, to the root of two", "stator"),

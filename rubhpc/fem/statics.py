@@ -101,15 +101,17 @@ SOFTNESS = 100.0  # 1/s2: a thousandth of the weight in a clearance of 0.1 mm
 def caught(body: Body, nodes: set[int]) -> Body:
     """Return a rotor that only bores at some nodes hold: with a softness, so that it has a static position.
 
-    Modes of 1.6 Hz stand for lateral rigid-body modes. A rotor that is held, or whose bearings depend on the
-    speed, is unchanged.
+    Modes of 1.6 Hz stand for lateral rigid-body modes. A rotor that is held at standstill is unchanged.
     """
     at = [body.index(node, name) for node in nodes for name in ("v", "w")]
-    if body.by_speed is not None or not rigid_body_row(body, [row for row in at if row >= 0]):
+    if not rigid_body_row(body, [row for row in at if row >= 0]):
         return body
     lateral = np.array([name in KINDS["lateral"] for _, name in body.degrees])
     soft = SOFTNESS * np.where(np.outer(lateral, lateral), body.mass, 0.0)
-    return replace(body, stiffness=body.stiffness + soft, softness=SOFTNESS)
+    tables = body.by_speed
+    if tables is not None:
+        tables = replace(tables, stiffness=tables.stiffness + soft)
+    return replace(body, stiffness=body.stiffness + soft, softness=SOFTNESS, by_speed=tables)
 
 
 FLOATS = "the rotor floats freely: its bearings do not hold it"

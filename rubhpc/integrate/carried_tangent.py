@@ -10,12 +10,9 @@ import numpy as np
 from rubhpc.integrate.lyapunov import N_ALIGNING
 from rubhpc.integrate.measuring.regimes import N_MOST
 from rubhpc.kernels.case_progress import FINISHED
-from rubhpc.kernels.collocation.tangent import FULL
 
 if TYPE_CHECKING:
     from rubhpc.integrate.marches.collocation import CollocationMarch
-
-MOST_EVENTS = 4096  # in a revolution
 
 
 class CarriedTangent:
@@ -34,16 +31,14 @@ class CarriedTangent:
 
     def part(self, n_revolution: int) -> float | None:
         """Continue; return the growth of the logarithm of the displacement, or None at an end."""
-        march, grown = self._march, 0.0
-        for _ in range(n_revolution):
-            self._tick += march.clock.samples_per_revolution << march.clock.sample_level
-            outcome, trail = march.carry(self._tick, self._column, MOST_EVENTS)
-            if outcome != FINISHED or trail.count[FULL]:
-                return None
-            self._column = trail.columns
-            size = self._scale()
-            grown += math.log(size) if size > 0.0 else -math.inf
-        return grown
+        clock = self._march.clock
+        self._tick += n_revolution * clock.samples_per_revolution << clock.sample_level
+        outcome, trail = self._march.carry(self._tick, self._column, 0)
+        if outcome != FINISHED:
+            return None
+        self._column = trail.columns
+        size = self._scale()
+        return math.log(size) if size > 0.0 else -math.inf
 
     def _scale(self) -> float:
         """Make the displacement one of unit size; returns what it was."""

@@ -27,6 +27,7 @@ from rubhpc.integrate.scheme import Scheme
 from rubhpc.kernels.case_progress import Clock
 from rubhpc.kernels.contact_modes import SAMPLES_AT_ONCE
 from rubhpc.kernels.laws import MULTIPLIER
+from rubhpc.rig.supports import is_time
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -41,15 +42,24 @@ if TYPE_CHECKING:
 
 FINEST_TICK = 1.9e-10  # s
 CONTACT_STEPS = 1024  # per revolution, at least, while recording a contact
+SAME_TURN = 1e-12  # share of a time, within which it is a whole number of revolutions
 LONGEST_TURN = FINEST_TICK * 2**46  # s, 3.7 hours: 64 bits count the ticks of a hundred thousand revolutions
 FEWEST_STEPS = 16  # per revolution, at least
 
 
 class Release(NamedTuple):
-    """What goes on where bearings let go of the shaft."""
+    """When bearings let go of the shaft, and what goes on."""
 
-    after: int  # revolutions of the record
+    until: float  # revolutions of the record, or its time, s
     setup: ModalSetup
+
+    def is_due(self, turn: int, time: float) -> bool:
+        """Whether they have let go after so many whole revolutions, which have taken a time, s."""
+        return (time if is_time(self.until) else turn) >= self.until * (1.0 - SAME_TURN)
+
+    def turn(self, begins: Floats) -> int:
+        """Whole revolutions after which they let go, at most n; begins (n + 1,), s, the last one an end."""
+        return next((i for i, time in enumerate(begins.tolist()) if self.is_due(i, time)), begins.size - 1)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

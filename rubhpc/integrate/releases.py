@@ -33,9 +33,10 @@ def record_through(
     """Record so many revolutions from where a march stands; where bearings let go, begin `again`."""
     parts: list[Part] = []
     gained, done, n_step, turn = 0.0, 0, 0, setup.interval * setup.samples_per_revolution
+    begins = turn * np.arange(n_revolution + 1, dtype=np.float64)
     while True:
         release = setup.release
-        n = (n_revolution if release is None else min(release.after, n_revolution)) - done
+        n = (n_revolution if release is None else release.turn(begins)) - done
         sums = following_accumulator(parts[-1].accumulator, turn * done) if parts else None
         marched = march_record(march, setup, n, sums)
         add_sag(marched.samples, marched.accumulator, setup.model)

@@ -18,7 +18,7 @@ from rubhpc.fem.statics import sag_at_stators
 from rubhpc.integrate.measuring.divergence import energy_limit
 from rubhpc.integrate.modal_setup import FINEST_TICK, LONGEST_TURN, ModalSetup, Release
 from rubhpc.integrate.packing import Packed, degrees_of, law_of, pack
-from rubhpc.integrate.reduced_model.reduction import reduce_model
+from rubhpc.integrate.reduced_model.reduction import reduce_model, reduced_sag
 from rubhpc.integrate.reduced_model.truncation import touch_of
 from rubhpc.integrate.scheme import Scheme, scheme_of
 from rubhpc.kernels.central_difference import Stepper
@@ -121,15 +121,6 @@ def prepare_steps(
 Setup: TypeAlias = CentralDifferenceSetup | ModalSetup
 
 
-def reduced_sag(model: Model, reduced: ReducedModel) -> Floats:
-    """Sag (n_dof,), m, of a rotor of little stiffness: in reduced coordinates, whose stiffness holds it."""
-    n = model.rotor.n_dof
-    basis, project = reduced.basis[:n], reduced.project[:, :n]
-    rests = np.linalg.solve(reduced.stiffness, basis.T @ model.load)
-    sag: Floats = model.sag + basis @ (rests - project @ model.sag)
-    return sag
-
-
 def moves_across(model: Model) -> bool:
     """Whether a stator's tip and disc can move across its axis, so that their line of centres turns."""
     aside = np.abs(sag_at_stators(model)[1])
@@ -200,8 +191,8 @@ def prepare(
         if model.rotor.softness:
             model = with_probes(replace(bare, sag=reduced_sag(model, reduced)), rig, probes, speed)
             limit += float(np.abs(model.sag).max())
-        if isinstance(rig.rotor, Rotor) and rig.rotor.let_go_at(speed) < math.inf:
-            after = replace(rig, rotor=rig.rotor.let_go(speed))
+        if isinstance(rig.rotor, Rotor) and rig.rotor.until is not None:
+            after = replace(rig, rotor=rig.rotor.let_go())
             alone = assemble(after)  # stators stay where they are set about the shaft before
             caught = prepare(
                 after,
@@ -215,7 +206,7 @@ def prepare(
                 is_measured=is_measured,
             )
             assert isinstance(caught, ModalSetup)
-            later = Release(int(rig.rotor.let_go_at(speed)), caught)
+            later = Release(rig.rotor.until, caught)
         return ModalSetup(
             scheme=scheme,
             model=model,

@@ -37,7 +37,8 @@ TOLERANCE = 1e-12  # m, a hundred times the tolerance of the integrators: a cont
 PARTED = 1e-9  # m, beyond which a closed contact has opened
 TURNED = 1e-10  # of the forces, by which they may have turned with their normals in the last pass
 LEAST_FORCE = np.finfo(float).tiny  # N, least force that marks a contact as closed
-MOST_PASSES = 40  # for curved gaps and springs; three or four are usual
+MOST_PASSES = 100  # for curved gaps and springs; three or four are usual, in bores ten
+SLOW, LEAST_TURN = 0.3, 0.01  # turn over that of the pass before, from which it is relaxed; share, at least
 
 
 def fit_to_gaps(state: State, setup: Setup, clearance: float) -> State:
@@ -73,6 +74,7 @@ def _fitted(state: State, setup: Setup, clearance: float, *, is_soft: bool = Fal
     gap, gap_jacobian = gaps(displacement, setup, clearance)
     force, is_found = np.zeros_like(gap), not np.any(gap + allowed < -TOLERANCE)
     softness = np.zeros_like(gap)  # m/N
+    share, last = 1.0, np.zeros_like(gap_jacobian)  # of the turn of normals that a pass takes
     if not is_found:
         for _ in range(MOST_PASSES):
             shape = static_shapes(gap_jacobian.T, setup)
@@ -83,10 +85,17 @@ def _fitted(state: State, setup: Setup, clearance: float, *, is_soft: bool = Fal
             softness = compression(setup, force) if is_soft else softness
             gap, gap_jacobian = gaps(displacement, setup, clearance)
             excess = gap + allowed + softness * force
-            is_turned = np.abs((gap_jacobian - before).T @ force).max() > TURNED * force.max()
+            turn = gap_jacobian - before
+            is_turned = np.abs(turn.T @ force).max() > TURNED * force.max()
             is_shut = np.all(excess >= -TOLERANCE) and np.all(excess[force > 0.0] <= TOLERANCE)
             if is_found := bool(is_shut and not is_turned):
                 break
+            change = turn - last
+            is_slow = last.any() and change.any() and np.abs(turn).max() > SLOW * np.abs(last).max()
+            if is_slow:  # Aitken's relaxation
+                share *= -float(np.vdot(last, change) / np.vdot(change, change))
+                share = min(max(share, LEAST_TURN), 1.0)
+            gap_jacobian, last = before + share * turn, turn
         rotor, *stators = setup.model.split(displacement)
         state = replace(state, rotor_displacement=rotor, stator_displacement=tuple(stators))
     is_closed = (state.contact_force > 0.0) & (gap <= PARTED)

@@ -143,7 +143,7 @@ def _kind_of(value: Any) -> Any:
 
 def _words_of(value: Any) -> tuple[int, ...]:
     if isinstance(value, np.ndarray):
-        return (value.ctypes.data, *value.shape, *value.strides)
+        return (value.__array_interface__["data"][0], *value.shape, *value.strides)
     if isinstance(value, Struct):
         return (value._address,)
     if isinstance(value, float | np.floating):

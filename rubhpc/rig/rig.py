@@ -18,6 +18,7 @@ from rubhpc.rig.parts import FIXED_AT_NODE_1, Torsion
 from rubhpc.rig.ross import rotor_from_ross
 from rubhpc.rig.rotors import UNLOADED, AnyRotor, MatrixRotor
 from rubhpc.rig.stators import AnyStator, Stator, single_stators
+from rubhpc.rig.supports import is_time
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -76,10 +77,16 @@ class Rig:
                 fix = f"add it, or add the diameter of a disc at node {stator.node}"
                 raise FieldError(f"stator.{i}.radius", f"missing, and no disc there has a diameter; {fix}")
         check_carriers(self.carrier, self.stator)
-        for i, bearing in enumerate(getattr(self.rotor, "bearing", ()), 1):
-            if bearing.until is not None and not any(stator.is_bore for stator in self.stator):
+        bearings = enumerate(getattr(self.rotor, "bearing", ()), 1)
+        releases = [(i, bearing.until) for i, bearing in bearings if bearing.until is not None]
+        for i, until in releases:
+            if not any(stator.is_bore for stator in self.stator):
                 problem = "no bore would catch the rotor"
                 raise FieldError(f"rotor.bearing.{i}.until", f'{problem}; add [[stator]] kind = "bore"')
+            if is_time(until) != is_time(releases[0][1]):
+                how = "a time" if is_time(until) else "a number of revolutions"
+                problem = f"is {how}, that of bearing {releases[0][0]} is not"
+                raise FieldError(f"rotor.bearing.{i}.until", f"{problem}; give both in the same way")
 
     @classmethod
     def from_matrices(

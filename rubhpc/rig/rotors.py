@@ -200,14 +200,15 @@ class Rotor(RotorForces):
                 pedestal = pedestal.pedestal
         return found
 
-    def let_go_at(self, spin: float) -> float:
-        """Whole revolutions after which the first bearing lets go at a spin, rad/s; infinite: none does."""
-        return min(bearing.let_go_at(spin) for bearing in self.bearing)
+    @property
+    def until(self) -> float | None:
+        """Revolutions or time, s, after which the first bearings let go; None: none does."""
+        return min((b.until for b in self.bearing if b.until is not None), default=None)
 
-    def let_go(self, spin: float) -> Rotor:
+    def let_go(self) -> Rotor:
         """Return the rotor without the bearings that let go first."""
-        first = self.let_go_at(spin)
-        bearing = tuple(let_go(b) if b.let_go_at(spin) == first else b for b in self.bearing)
+        first = self.until
+        bearing = tuple(b if b.until is None or b.until != first else let_go(b) for b in self.bearing)
         return replace(self, bearing=bearing)
 
     @property

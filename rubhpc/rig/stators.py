@@ -22,9 +22,10 @@ from rubhpc.input.fields import (
     text,
     words,
 )
+from rubhpc.input.reading import build
 from rubhpc.models import LINEAR, SECOND_ORDER, default_of
 from rubhpc.rig.matrix_body import check_body, checked_matrices
-from rubhpc.rig.normal_law import NormalLaw  # noqa: TC001 - annotations are read when a rig is built
+from rubhpc.rig.normal_law import NormalLaw
 from rubhpc.rig.parts import MOST_ELEMENTS, UNDAMPED, Damping
 from rubhpc.units import typed_quantity
 
@@ -91,6 +92,9 @@ class Seat:
 
     def __post_init__(self) -> None:
         check_fields(self)
+        law: object = self.law
+        if isinstance(law, dict):  # as in a file
+            object.__setattr__(self, "law", build(NormalLaw, law, type(self).__name__, "law"))
         if self.kind not in (None, self.KIND):
             assert self.kind is not None
             raise FieldError("kind", f'"{self.kind}" is another stator; use rubhpc.{KINDS[self.kind]}')

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -189,12 +188,10 @@ class Support(Masses, Placed):
         """Return the changes of other fields when `keys` are set."""
         return Placed.displaced(self, keys) | Masses.displaced(self, keys)
 
-    def let_go_at(self, spin: float) -> float:
-        """Whole revolutions after which it lets go of a shaft with this spin, rad/s; infinite: never."""
-        if self.until is None:
-            return math.inf
-        turns = self.until * (abs(spin) / (2.0 * math.pi) if getattr(self.until, "unit", "") == "s" else 1.0)
-        return float(math.ceil(turns * (1.0 - 1e-12)))
+
+def is_time(until: float) -> bool:
+    """Whether a value of `until` is a time, s, not a number of revolutions."""
+    return getattr(until, "unit", "") == "s"
 
 
 def check_pairs(owner: Masses, one: str, pairs: tuple[str, ...]) -> None:

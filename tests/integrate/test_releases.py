@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 
 from rubhpc import Bore, InputError, read_rig, run_up, simulate
+from rubhpc.integrate.modal_setup import Release
 from rubhpc.rig.reading import rig_from_dict, with_keys
 
 PACKAGED = read_rig("mokhtar2017")
 CATCHER = Bore(node=4, radius=0.02, mass=2.0, stiffness=5e6, damping=3000.0)
 CLEARANCE = 0.25e-3
 CASE = {"speed": "3000 rpm", "clearance": CLEARANCE, "friction": 0.05, "transient": 1}
+SPRINGS = {"friction": 0.1, "law": "penalty", "stiffness": "1e7 N/m", "damping": "3000 N*s/m"}
 STIFF = {
     "rotor.shaft.youngs_modulus": "2100 GPa"
 }  # so that it falls as one, but for the bending that its bearings have caused
@@ -31,14 +33,16 @@ def levitated(until="1 revolution", bores=(4, 12), **keys):
 def test_it_is_read_and_goes_through_a_store():
     for until, turns in (("2 revolutions", 2.0), (2, 2.0), ("0.05 s", 3.0)):
         rig = levitated(until)
-        assert rig.rotor.let_go_at(100 * math.pi) == turns
         again = rig_from_dict(rig.as_dict())
         assert again == rig
-        assert again.rotor.let_go_at(100 * math.pi) == turns
+        for one in (rig, again):
+            assert Release(one.rotor.until, None).turn(0.02 * np.arange(6)) == turns
     with pytest.raises(InputError, match=r"until: no bore would catch the rotor; add \[\[stator\]\] kind"):
         replace(rig, stator=PACKAGED.stator)
-    with pytest.raises(InputError, match="let go at a constant speed"):
-        run_up(rig, start="1000 rpm", stop="2000 rpm", time="1 s", clearance=CLEARANCE)
+    table = rig.as_dict()
+    table["rotor"]["bearing"][0]["until"] = 2
+    with pytest.raises(InputError, match=r"bearing.2\] until: is a time, that of bearing 1 is not"):
+        rig_from_dict(table)
 
 
 def test_drop():
@@ -74,3 +78,61 @@ def test_a_bearing_that_keeps_hold_holds():
     assert record.contact_force[1].any()
     first = [np.flatnonzero(force)[:1] for force in record.contact_force]
     assert not first[0].size or first[1][0] < first[0][0]
+
+
+def test_drop_while_running_down():
+    """The parabola of a free fall, whatever the speed does, and nothing jumps as the bearings let go."""
+    law = {"start": "3000 rpm", "stop": "2700 rpm", "time": "0.08 s"}
+    record = run_up(levitated(), **law, clearance=CLEARANCE, friction=0.05, samples_per_revolution=512)
+    n, rate = 512, 300 * math.pi / 30 / 0.08
+    turned = 2 * math.pi * record.turned.values
+    time = (100 * math.pi - np.sqrt((100 * math.pi) ** 2 - 2 * rate * turned)) / rate
+    vertical, time = record.vertical.values, time - time[n]
+    first = np.flatnonzero(record.contact_force.values.any(axis=0))[0]
+    assert time[first] == pytest.approx(math.sqrt(2 * CLEARANCE / 9.81), rel=2e-2)
+    fallen = vertical[n:first] - vertical[0]
+    assert fallen == pytest.approx(-0.5 * 9.81 * time[n:first] ** 2, rel=0, abs=6e-2 * CLEARANCE)
+    assert np.ptp(vertical[: n + 1]) < 1e-12
+    assert np.abs(np.diff(vertical[n : n + 4], 2)).max() < 1e-3 * np.abs(fallen).max()
+
+
+@pytest.mark.parametrize("until", ["1 revolution", "0.03 s", 0])
+def test_a_speed_that_hardly_changes_is_a_constant_one(until):
+    rig = levitated(until, **{"rotor.unbalance.mass": 2e-3})
+    case = {"clearance": CLEARANCE, "samples_per_revolution": 64, **SPRINGS}
+    still = {"transient": 0, "revolutions": 3, "initial": {"from": "contact_free"}}
+    constant = simulate(rig, speed="3000 rpm", **still, **case)
+    drive = {"torque": 0.0, "start": "3000 rpm", "revolutions": 3, "inertia": "1000 kg m^2"}
+    slow = run_up(rig, start="3000 rpm", stop="2999.9999 rpm", time="0.06001 s", **case)
+    driven = run_up(rig, drive=drive, **case)
+    for record in (slow, driven):
+        assert record.vertical.values == pytest.approx(constant.vertical, abs=1e-7 * CLEARANCE)
+        assert record.torsion.values == pytest.approx(constant.torsion, abs=1e-4 * np.ptp(constant.torsion))
+        assert record.peak_contact_force.values.max(axis=0) == pytest.approx(constant.peak_contact_force)
+    assert abs(driven.energy_residual) < 1e-7
+
+
+def test_what_the_motion_gains_comes_from_the_spin():
+    """The fall brakes a rotor that coasts; energies balance through the release."""
+    drive = {"torque": 0.0, "start": "3000 rpm", "revolutions": 5, "inertia": "0.001 kg m^2"}
+    record = run_up(
+        levitated("0.03 s"), drive=drive, clearance=CLEARANCE, samples_per_revolution=64, **SPRINGS
+    )
+    assert not record.contact_fraction[:2].values.any()
+    assert record.contact_fraction[2:].values.all()
+    assert record.speed[4] < 0.999 * record.speed[0]
+    assert abs(record.energy_residual) < 1e-6
+
+
+def test_a_seal_with_a_table_may_stay():
+    """It does not hold the shaft alone: the bores do."""
+    table = levitated(1).as_dict()
+    seal = {"node": 8, "speed": [100.0, 400.0], "kyy": [0.0, 1e3], "kzz": [0.0, 1e3], "cyy": [50.0, 60.0]}
+    table["rotor"]["bearing"].append(seal | {"czz": [50.0, 60.0]})
+    case = {"clearance": CLEARANCE, "samples_per_revolution": 64, **SPRINGS}
+    start = {"transient": 0, "revolutions": 3, "initial": {"from": "contact_free"}}
+    constant = simulate(rig_from_dict(table), speed="3000 rpm", **start, **case)
+    assert constant.contact_fraction.all()
+    law = {"start": "3000 rpm", "stop": "2999.9999 rpm", "time": "0.06001 s"}
+    slow = run_up(rig_from_dict(table), **law, **case)
+    assert slow.vertical.values == pytest.approx(constant.vertical, abs=1e-3 * CLEARANCE)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from closed_form import Contact, simulate
 from trial_rig import trial_rig
 
+from rubhpc import Bore, read_rig
+from rubhpc import simulate as simulate_any
 from rubhpc.errors import InputError
 from rubhpc.fem.response import contact_free_amplitude
 from rubhpc.integrate.overlaps import gaps
@@ -118,3 +121,22 @@ def test_a_record_goes_on_from_a_start_without_loss_of_energy():
 def test_what_cannot_be_is_refused(initial, message):
     with pytest.raises(InputError, match=message):
         simulate("mokhtar2017", speed_ratio=0.75, clearance=1e-4, initial=initial, transient=1, revolutions=1)
+
+
+def test_a_start_far_beyond_two_bores_touches_both():
+    """Forces turn with their normals: the more the farther the shaft would be."""
+    bores = [Bore(node=node, radius=0.02, mass=1.0, stiffness=1e7, damping=100.0) for node in (6, 12)]
+    rig = replace(read_rig("mokhtar2017"), stator=tuple(bores))
+    record = simulate_any(
+        rig,
+        speed=400.0,
+        clearance=1e-4,
+        friction=0.0,
+        overrides={"rotor.unbalance.mass": 0.1},
+        initial={"from": "contact_free"},
+        transient=0,
+        revolutions=1,
+        samples_per_revolution=64,
+    )
+    assert record.contact_force[:, 0].min() > 100.0
+    assert abs(record.energy_residual) < 1e-6

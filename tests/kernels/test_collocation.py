@@ -141,10 +141,9 @@ def test_a_step_is_the_motion_under_loads_that_are_polynomials(contact):
     for i, at in enumerate(modes.nodes.at[1:], 1):
         known = (expm(rate[: 2 * n + 2, : 2 * n + 2] * step * at) @ free)[: 2 * n] + moved[:, i].sum(axis=0)
         place, going = modes.local @ known[:n], modes.local @ known[n:]
-        first = interpreted(tables.rate_row)(s, n_row, i)
-        scale = np.abs(place).max(), np.abs(going).max()
-        assert y[(i - 1) * n_row : i * n_row] == pytest.approx(place, abs=1e-8 * scale[0])
-        assert y[first : first + n_row] == pytest.approx(going, abs=1e-8 * scale[1])
+        for kind, those in enumerate((place, going)):
+            rows = [interpreted(tables.row_of)(s, bodies.n_local, r, kind, i) for r in range(n_row)]
+            assert y[rows] == pytest.approx(those, abs=1e-8 * np.abs(those).max())
     assert modes.motion @ after == pytest.approx(known, abs=1e-8 * np.abs(known).max())
 
 
@@ -195,13 +194,13 @@ class Step:
         self.solution, self.state, self.slot = march._solution, np.array(state), slot
         rng, s, n_local = np.random.default_rng(seed), self.nodes.at.size, bodies.n_local
         interpreted(tables.fill_step)(bodies, self.nodes, self.tables, slot)
-        n_row = bodies.load.shape[0]
-        self.n_y = (2 * s - 1) * n_row
+        n_row, self.has_place = bodies.load.shape[0], not bodies.is_straight
         self.x = march._modes.coordinates(march._motion + 1e-4 * rng.normal(size=march._motion.size))
         interpreted(newton.see_start)(bodies, self.x, self.solution)
         self.n_closed, self.n_pushed, self.n = interpreted(newton.list_closed)(
             bodies, self.nodes, self.state, self.solution
         )
+        interpreted(newton.use_matrix)(bodies, self.tables, slot, self.state, self.solution)
         self.solution.y_free[:] = self.tables.free[slot] @ self.x
         self.force = 5.0 + rng.normal(size=(len(self.state), 2, s))
         self.force[:, FRICTION] *= 0.2
@@ -212,28 +211,35 @@ class Step:
             n_force = interpreted(newton.n_force)(bodies, self.state[i])
             self.unknown += [(self.force, (i, f, k)) for f in range(n_force) for k in range(s)]
         self.size += [1.0] * len(self.unknown)
-        for i in np.flatnonzero(self.state):
+        for i in np.flatnonzero(self.state) if self.has_place else []:
             columns = [i * n_local + a for a in range(n_local) if a != TWIST]
             self.unknown += [(self.solution.place, (k, a)) for k in range(1, s) for a in columns]
         self.size += [1e-5] * (len(self.unknown) - len(self.size))
 
     def residual(self):
         """All residuals."""
-        s, n_local, n_row = self.nodes.at.size, self.bodies.n_local, self.bodies.load.shape[0]
-        given = self.bodies, self.nodes, self.state, self.force, self.n_closed, self.solution
+        s, n_local, solution = self.nodes.at.size, self.bodies.n_local, self.solution
+        given = self.bodies, self.nodes, self.state, self.force, self.n_closed, solution
         for i in np.flatnonzero(self.state):
             for k in range(s):
-                interpreted(gaps.see_gap)(
-                    self.bodies, i, self.solution.place[k], i * n_local, i * s + k, self.solution
-                )
+                interpreted(gaps.see_gap)(self.bodies, i, solution.place[k], i * n_local, i * s + k, solution)
         interpreted(newton.push_closed)(*given)
+        blocks, pairs = (0, 2 * s - 1), (0, self.n_closed)
         interpreted(newton.respond)(
-            self.tables, self.slot, n_row, n_local, self.n_closed, 0, self.n_y, self.solution
+            self.bodies,
+            s,
+            self.tables.forced[self.slot],
+            self.n_closed,
+            blocks,
+            pairs,
+            solution.load,
+            solution,
         )
+        if not self.has_place:
+            interpreted(newton.follow_loads)(self.bodies, self.nodes, self.n_closed, solution)
+            interpreted(newton.see_gaps)(self.bodies, self.nodes, self.n_closed, solution)
         is_lean = False
-        interpreted(newton.fill_residual)(
-            *given[:2], self.tables, self.slot, *given[2:5], is_lean, self.solution
-        )
+        interpreted(newton.fill_residual)(*given[:2], self.tables, self.slot, *given[2:5], is_lean, solution)
         return self.solution.residual[: self.n].copy()
 
     def by_differences(self):
@@ -252,8 +258,10 @@ class Step:
         """The same by `fill_matrix`: its factors put together."""
         self.residual()
         given = self.bodies, self.nodes, self.tables, self.slot, self.state, self.force
-        assert interpreted(newton.fill_matrix)(*given, self.n_closed, self.n, self.n_y, self.solution)
-        factors, pivot = (of[self.slot, : self.n] for of in (self.solution.matrix, self.solution.pivot))
+        blocks = 0, 2 * self.nodes.at.size - 1
+        assert interpreted(newton.fill_matrix)(*given, self.n_closed, blocks, self.solution)
+        used = self.solution.used[0]
+        factors, pivot = (of[used, : self.n] for of in (self.solution.matrix, self.solution.pivot))
         factors = factors[:, : self.n]
         upper = np.triu(factors, 1) + np.diag(1.0 / np.diag(factors))
         found = (np.tril(factors, -1) + np.eye(self.n)) @ upper

@@ -33,6 +33,9 @@ def test_a_bore_is_read_with_units_and_goes_through_a_store():
     )
     assert rig.contact_radius(bore) == 0.06
     assert rig_from_dict(rig.as_dict()) == rig
+    assert Bore(node=8, rigid=True, law=law).law == bore.law
+    with pytest.raises(InputError, match=r"Bore: \[law\] stiffness: missing; kind = .penalty. needs one"):
+        Bore(node=8, rigid=True, law={"kind": "penalty"})
     assert with_keys(rig, {"stator.law.stiffness": 2e10}).stator[0].law.stiffness == 2e10
     assert with_keys(rig, {"stator.stiffness_z": 5e5}).stator[0].springs == (1e6, 5e5)
     split = with_keys(rig, {"stator.stiffness_z": 5e5})

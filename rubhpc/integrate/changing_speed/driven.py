@@ -114,11 +114,16 @@ def integrate_driven(
     begins = np.zeros(n + 1)
     spin = Spin(fastest, drive, clearance, friction, initial, check, say)
     n_step, reason, n_done, end, at = 0, "", 0, ALL_TURNED, 0
-    energies = np.zeros(6)
+    energies, release = np.zeros(6), fastest.release
     while at < n * per_revolution:
         note(at / (n * per_revolution))
+        done, past = divmod(at, per_revolution)
+        while release is not None and not past and release.is_due(done, spin.time):
+            spin.go_on(release.setup)
+            release = release.setup.release
         if pieces_per_revolution is None:
-            length = _fitting(length, at, n * per_revolution, per_revolution)
+            end_turn = n if release is None else done + 1
+            length = _fitting(length, at, end_turn * per_revolution, per_revolution)
         taken = spin.take(at, length, per_revolution, is_fixed=pieces_per_revolution is not None)
         if taken is None:
             if pieces_per_revolution is None and length % 2 == 0 and length > 1:

@@ -92,6 +92,16 @@ class Spin:
         # The contact forces of the piece before, and how long it took, s.
         self._earlier = new_accumulator(len(model.stators), model.n_place), 0.0
 
+    def go_on(self, fastest: ModalSetup) -> None:
+        """Go on from the motion reached in another set-up at the highest speed."""
+        if self._begun is None:
+            torque, inertia = self._twisting, self._free.inertia
+            at = self.speed, torque / inertia, 0.0, 2.0 * math.pi / self.speed, torque
+            self._setup = self._pieces.setup(*at, self._drive.slope(self.speed))
+            self._begun = self._start(self._setup)
+        self._begun = self.state
+        self._pieces, self._passing, self._ended = Pieces(fastest), self._passing.anew(), None
+
     @property
     def state(self) -> State:
         """The motion reached."""
@@ -139,12 +149,8 @@ class Spin:
                     sag_ramp(setup.held, acceleration, self.speed, end_speed, duration), setup
                 )
             if self._begun is None:
-                start = self._initial
-                if isinstance(start, Initial):
-                    state = start_of(start, setup, self._clearance, self.speed)
-                    self._begun = ramp.of_rotor(state, setup)
-                else:
-                    self._begun = start
+                start = self._start(setup)
+                self._begun = start if start is self._initial else ramp.of_rotor(start, setup)
             reached = ramp.about_middle(self._begun, setup)
             before = self._ended
             self._passing.left = before.left if before else None
@@ -207,6 +213,13 @@ class Spin:
         self._begun = ramp.after(passed.end, setup)
         self._earlier = passed.accumulators[-1], duration
         return found
+
+    def _start(self, setup: PieceSetup) -> State:
+        """The state in which the case starts."""
+        start = self._initial
+        if isinstance(start, Initial):
+            return start_of(start, setup, self._clearance, self.speed)
+        return start
 
     def _is_open(self, setup: PieceSetup) -> bool:
         """Whether nothing touches as a piece begins, about the sag of its middle too."""

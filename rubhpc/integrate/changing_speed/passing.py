@@ -251,6 +251,10 @@ class Passing:
         self._room: dict[int, Samples] = {}  # by number of samples of a piece
         self._at: PieceSetup | None = None  # the piece at whose beginning the march is
 
+    def anew(self) -> Passing:
+        """Another one of the same case, which has not begun."""
+        return Passing(*self._case, self._check, self._say)
+
     def take(
         self,
         setup: PieceSetup,

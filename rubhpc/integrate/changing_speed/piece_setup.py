@@ -14,6 +14,7 @@ from rubhpc.integrate.changing_speed.mode_courses import between
 from rubhpc.integrate.changing_speed.range_library import AT_ONCE, RangeLibrary, TableBuffer
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.reduced_model.flight_modes import FlightModes
+from rubhpc.integrate.reduced_model.reduction import reduced_sag
 from rubhpc.integrate.reduced_model.system_modes import KeptParts
 
 if TYPE_CHECKING:
@@ -128,6 +129,8 @@ class HeldMatrices:
             sag, film, rows = models[0].sag, models[0].film, models[0].probe_rows[0]
             if within and film is None:
                 sag = between([model.sag for model in models], within)
+                if self.model.rotor.softness:  # which bends over the speed, metres wide
+                    sag = reduced_sag(self.model, self.at_place(within))
                 rows = between([model.probe_rows[0] for model in models], within)
             elif within:  # positions of journals may bend where no matrix does
                 known = self.model.rotor.tabulated_speeds

@@ -8,7 +8,6 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from rubhpc.errors import InputError
 from rubhpc.integrate.changing_speed.piece_setup import with_values
 from rubhpc.integrate.changing_speed.range_library import AT_ONCE, speeds_of
 from rubhpc.integrate.changing_speed.ripples import Ripples
@@ -108,9 +107,6 @@ class Pieces:
     """The set-ups of the pieces of a run-up, from that at its highest speed, which keeps the most modes."""
 
     def __init__(self, fastest: ModalSetup) -> None:
-        if fastest.release is not None:
-            problem = "bearings let go at a constant speed, not in a run-up or under a drive"
-            raise InputError(f"[rotor.bearing] until: {problem}; leave it out")
         self._fastest = fastest
         self._ranges = SpeedRanges(fastest)
         self._held: list[HeldMatrices] = []  # the latest first

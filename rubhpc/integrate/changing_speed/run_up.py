@@ -11,7 +11,7 @@ the rest alternates. The error is proportional to the square of the length of pi
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -27,17 +27,19 @@ from rubhpc.integrate.start import start_of
 from rubhpc.study.initial import CONTACT_FREE, Initial
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
     from rubhpc.integrate.changing_speed.passing import Ended
+    from rubhpc.integrate.changing_speed.pieces import Block
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.kernels.accumulators import Accumulator
     from rubhpc.study.speed_law import SpeedLaw
 
     Floats = NDArray[np.float64]
+    Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -108,13 +110,13 @@ def integrate_run_up(
         Called with the share of the revolutions that is done.
     """
     model, per_revolution = fastest.model, fastest.samples_per_revolution
-    pieces, passing = Pieces(fastest), Passing(clearance, friction, check, say)
-    cuts = pieces.ripples.cut(law, per_revolution, pieces_per_revolution)
     n_stator, n = len(model.stators), law.n_revolution
+    begins, _, _ = law.at_angle(2.0 * np.pi * np.arange(n + 1))
+    stages = _stages(fastest, law, begins, pieces_per_revolution)
+    cuts = np.unique(np.concatenate([stage.cuts for stage in stages]))
     angles = 2.0 * np.pi / per_revolution * cuts.astype(np.float64)
     times, at_cuts, _ = law.at_angle(angles)
     _, _, accelerations = law.at_angle(0.5 * (angles[1:] + angles[:-1]))
-    begins, _, _ = law.at_angle(2.0 * np.pi * np.arange(n + 1))
     whole = empty_samples(model.n_place, n * per_revolution, model.n_probe, model.n_push).whole
     gathered = Turns(n, model)
     reached: State | Place | None = initial if isinstance(initial, State) else None
@@ -132,12 +134,21 @@ def integrate_run_up(
     sudden[bent] = accelerations[bent] - law.at_angle(angles[bent])[2]  # past its first sample
     late[bent] = ((speeds - 0.5 * (at_cuts[1:] + at_cuts[:-1])) * durations)[bent]
     is_even = sizes > 1  # pieces of one sample are around a bend
-    lag = (accelerations * durations**2 / 12.0)[is_even]
-    advice = pieces.ripples.advice(speeds[is_even], sizes[is_even] / per_revolution, lag, signal_names(model))
+    lags, lengths, names = accelerations * durations**2 / 12.0, sizes / per_revolution, signal_names(model)
+    judged = [(stage.pieces.ripples, np.arange(*stage.at)[is_even[slice(*stage.at)]]) for stage in stages]
+    advice = [ripples.advice(speeds[at], lengths[at], lags[at], names) for ripples, at in judged]
     unit, none = unit_rotation(model.rotor), np.zeros(model.rotor.n_dof)
     piece = 0
     ended: Ended | None = None  # the last piece
-    for block in pieces.blocks(speeds, accelerations, angles[:-1], durations, sizes):
+    passing = Passing(clearance, friction, check, say)
+    if stages[0].at == (0, 0) and isinstance(initial, Initial):  # bearings let go before the first piece
+        at_first = (float(column[0]) for column in (speeds, accelerations, angles, durations))
+        setup = stages[0].pieces.setup(*at_first)
+        reached = start_of(initial, setup, clearance, law.speed[0])
+    of_pieces = speeds, accelerations, angles[:-1], durations, sizes
+    for block, is_released in _blocks(stages, of_pieces):
+        if is_released and reached is not None:
+            reached, ended, passing = state_at(reached, setup), None, passing.anew()
         setup, size, begins_at = block[0], int(sizes[piece]), piece
         if setup.model is not sagging:
             lift_samples(whole[:, begun : cuts[piece]], sagging)
@@ -220,8 +231,45 @@ def integrate_run_up(
         together=gathered.together,
         n_step=n_step,
         final=state_at(reached, setup),
-        advice=advice,
+        advice=next(filter(None, advice), ""),
     )
+
+
+class _Stage(NamedTuple):
+    """Part of a run-up up to where bearings let go of the shaft."""
+
+    pieces: Pieces
+    cuts: Ints  # samples between which its pieces lie
+    at: tuple[int, int]  # its first piece, and the first of the next stage
+
+
+def _stages(
+    fastest: ModalSetup, law: SpeedLaw, begins: Floats, pieces_per_revolution: int | None
+) -> list[_Stage]:
+    """Return the stages of a run-up whose revolutions begin at times, s; the first one may have no piece."""
+    stages: list[_Stage] = []
+    setup, done, n_piece, per_revolution = fastest, 0, 0, fastest.samples_per_revolution
+    while True:
+        release = setup.release
+        end = begins.size - 1 if release is None else release.turn(begins)
+        if end > done or not stages:
+            pieces, ends = Pieces(setup), np.array([done, end]) * per_revolution
+            cuts = pieces.ripples.cut(law, per_revolution, pieces_per_revolution)
+            cuts = np.union1d(cuts[(cuts > ends[0]) & (cuts < ends[1])], ends)
+            first, n_piece = n_piece, n_piece + cuts.size - 1
+            stages.append(_Stage(pieces, cuts, (first, n_piece)))
+        if release is None or end == begins.size - 1:
+            return stages
+        setup, done = release.setup, end
+
+
+def _blocks(stages: list[_Stage], of_pieces: tuple[Any, ...]) -> Iterator[tuple[Block, bool]]:
+    """Blocks of all stages, and whether bearings let go before each; columns as of `Pieces.blocks`."""
+    for stage in stages:
+        is_released = stage is not stages[0]
+        for block in stage.pieces.blocks(*(column[slice(*stage.at)] for column in of_pieces)):
+            yield block, is_released
+            is_released = False
 
 
 def is_contact_free(initial: Initial, begun: State) -> bool:

@@ -17,6 +17,7 @@ from rubhpc.integrate.changing_speed.piece_setup import HeldMatrices, PieceSetup
 from rubhpc.integrate.changing_speed.range_library import speeds_of
 from rubhpc.integrate.changing_speed.ripples import Linear
 from rubhpc.integrate.packing import whole_system
+from rubhpc.integrate.reduced_model.reduction import reduced_sag
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -32,6 +33,7 @@ WIDEST = 0.5  # half of the range over the speed
 WIDEST_TABULATED = 0.16  # the same where bearings follow a table, not a straight line
 LONGEST_FALL = 1.0 / 3.0  # half of the range over the first speed of a coast-down, which stays above 0
 DRIVEN_SHARE = 0.25  # of the accuracy, of modes of a driven rotor, whose twist errs most
+SOFT_SHARE = 0.1  # the same of a rotor of little stiffness, which is metres away from its sag
 
 _BUFFERS: WeakKeyDictionary[ModalSetup, dict[tuple[object, ...], TableBuffer]] = WeakKeyDictionary()
 
@@ -158,6 +160,8 @@ class SpeedRanges:
         )
         for name in ("translations", "project"):  # which need not be computed again
             reduced.__dict__[name] = getattr(fastest.reduced, name)
+        if model.rotor.softness:
+            model = sagging(model, reduced_sag(model, reduced), model.film)
         return model, reduced
 
     def _reach(
@@ -172,7 +176,7 @@ class SpeedRanges:
             damping, stiffness = self._system(replace(model, rotor=rotor), at, acceleration, slope)
             return stiffness, damping
 
-        seen = self.linear(speed, is_whole=True).seen
+        seen, soft = self.linear(speed, is_whole=True).seen, model.rotor.softness
         return followed_reach(
             rotor_of(fastest, matrices, self.phasor, seen),
             speed,
@@ -180,7 +184,7 @@ class SpeedRanges:
             self._momentum,
             self._widest(speed, acceleration),
             sense=0.0 if is_free else float(np.sign(acceleration)),
-            accuracy=(DRIVEN_SHARE if is_free else 1.0) * fastest.accuracy,
+            accuracy=(SOFT_SHARE if soft else DRIVEN_SHARE if is_free else 1.0) * fastest.accuracy,
             guess=guess,
         )
 

@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
 
 Floats = NDArray[np.float64]
+MOST_KEPT, ROOM = 64, 1 << 23  # matrices of each length of step where gaps are straight; bytes of all of them
 
 
 class Contacts(NamedTuple):
@@ -117,6 +118,7 @@ class CollocationMarch(ModalMarch):
         self.n_step, self.sample, self._stride = 0, 0, ALL_SAMPLES
         self._take(setup)
         self._motion[:] = self.moved(setup, place)
+        shortest = self._modes.tables.first_level
         self._use_modes(setup)
         self._begin(place.contact_force)
         if place.contacts is not None:
@@ -125,8 +127,10 @@ class CollocationMarch(ModalMarch):
             self._case.lasting[:] = contacts.lasting
             self._case.since[:] = -np.round(contacts.age / self.clock.tick).astype(np.int64)
             self._memory["is_new"] = 0
-            for name in ("slot", "scale", "fastest", "unseen"):
+            for name in ("scale", "fastest", "unseen"):
                 self._memory[name] = contacts.memory[name]
+            slot = contacts.memory["slot"] + shortest - self._modes.tables.first_level
+            self._memory["slot"] = np.clip(slot, 0, self._modes.tables.is_filled.size - 1)
 
     def reached(self) -> Place:
         """Present motion and contacts, for another speed to continue from."""
@@ -179,10 +183,15 @@ class CollocationMarch(ModalMarch):
     def carry(
         self, last_tick: int, columns: Floats, n_event: int, accuracy: float | None = None
     ) -> tuple[int, Trail]:
-        """Go on to a tick with tangent columns (nx, k) and events: outcome of the kernel, and the trail."""
+        """Go on to a tick with tangent columns (nx, k) and up to `n_event` events.
+
+        Returns the outcome of the kernel, and the trail.
+        """
         own, self.accuracy = self.accuracy, accuracy or self.accuracy
         trail = self.new_trail(columns, n_event)
         self.trail, (samples, accumulator) = trail, self._idle
+        longest = self._modes.tangent_tables.is_filled.size - 1
+        self._memory["slot"] = np.minimum(self._memory["slot"], longest)
         outcome = PAUSED
         while outcome == PAUSED and not trail.count[TOO_MANY]:
             outcome = self._kernel(last_tick, samples, accumulator, False)
@@ -280,7 +289,12 @@ class CollocationMarch(ModalMarch):
         modes = self._modes
         n_y, n_x = modes.tables.free.shape[1:]
         k, s, q, nl = modes.tables.is_filled.size, modes.nodes.at.size, self._clearance.size, modes.n_local
-        n_row, n, zeros = q * nl, q * (2 * s + (s - 1) * (nl - 1)), np.zeros
+        n_row, n, zeros = q * nl, 2 * s * q, np.zeros
+        m = 1
+        if self._contacts.is_straight:
+            m = min(MOST_KEPT, max(1, ROOM // (8 * k * n * n)))
+        else:
+            n += q * (s - 1) * (nl - 1)
         return Solution(
             start=zeros(3 * n_row),
             y=zeros(n_y),
@@ -302,10 +316,12 @@ class CollocationMarch(ModalMarch):
             direction=zeros((s * q, 2, nl)),
             residual=zeros(n),
             closed=zeros(q, dtype=np.int64),
-            matrix=zeros((k, n, n)),
-            pivot=zeros((k, n), dtype=np.int64),
-            states=zeros(k, dtype=np.int64),
-            noise=zeros(k),
+            matrix=zeros((k * m, n, n)),
+            pivot=zeros((k * m, n), dtype=np.int64),
+            states=zeros(k * m, dtype=np.int64),
+            noise=zeros(k * m),
+            used=zeros(2, dtype=np.int64),
+            size=zeros(modes.exponent.size),
             change=zeros(n_y),
             moved=zeros((s, n_row)),
             begun=zeros(3 * n_row),
@@ -330,9 +346,12 @@ class CollocationMarch(ModalMarch):
 
     def _new_seen(self, samples: Samples, accumulator: Accumulator) -> Seen:
         signals, s = self._modes.signals, self._modes.nodes.at.size
-        measured = Measured(self._recorder, samples, accumulator)
-        if self._seen is not None:
-            return self._seen._replace(measured=measured)
+        if self._seen is not None and self._seen.read.size == signals.free.shape[1]:
+            measured = self._seen.measured
+            is_same = measured.samples is samples and measured.accumulator is accumulator
+            if is_same and measured.recorder is self._recorder:
+                return self._seen
+            return self._seen._replace(measured=Measured(self._recorder, samples, accumulator))
         n_x = self._case.x.size
         return Seen(
             begun=np.zeros(n_x),
@@ -343,7 +362,7 @@ class CollocationMarch(ModalMarch):
             factor=np.zeros((s, len(signals.power))),
             read=np.zeros(signals.free.shape[1]),
             part=np.zeros(s),
-            measured=measured,
+            measured=Measured(self._recorder, samples, accumulator),
         )
 
     def _kernel(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
@@ -352,7 +371,7 @@ class CollocationMarch(ModalMarch):
         return advance_by_collocation(
             self._contacts,
             modes.nodes,
-            modes.tables,
+            modes.tables if self.trail is None else modes.tangent_tables,
             modes.signals,
             modes.power,
             self.clock,

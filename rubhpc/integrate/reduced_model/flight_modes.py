@@ -40,7 +40,8 @@ if TYPE_CHECKING:
     Complexes = NDArray[np.complex128]
 
 NODES_HARD, NODES_SPRING = 4, 5
-LONGEST_PART = 128  # longest step: a revolution over this
+LONGEST_LEVEL = 7  # of a revolution, longest step: over 2^7; also of any step with a tangent
+LONGER_IN_BORES = 2  # levels by which it is longer where contact may last and the force only turn
 SHORTEST_LEVEL = 6  # ticks of the shortest step, as a power of two
 QUIET = 3e-4  # m/s2, of a rotor that bores catch, by the rounding of its displacement in the shortest step
 MOST_SLOTS = 16
@@ -222,7 +223,9 @@ class FlightModes:
             kick=np.ascontiguousarray(kick),
             bend=np.abs(moving * self.exponent),
             compliance=self.local @ self.local.T,
+            reach=np.abs(moving) @ np.abs(self.kicks).T,
             kind=np.full(q, ROUND if setup.is_updated else FIXED),
+            is_straight=not setup.is_updated and self.n_local == BENDING,
             radius=radius,
             clearance=np.zeros(q),
             aside=self.sense * sag_at_stators(setup.model)[1],
@@ -254,11 +257,12 @@ class FlightModes:
         """Tables of steps, filled when first taken."""
         setup, s, n_row = self.setup, self.nodes.at.size, len(self.local)
         turn = 2.0 * math.pi / abs(setup.spin)
-        longest = math.floor(math.log2(turn / LONGEST_PART / setup.tick))
+        longest = math.floor(math.log2(turn / setup.tick)) - LONGEST_LEVEL
         first = max(SHORTEST_LEVEL, longest - MOST_SLOTS + 1)
         if setup.model.rotor.softness:  # it rests metres away: shorter steps see the rounding of that
             least = math.sqrt(np.finfo(float).eps * float(np.abs(setup.model.sag).max()) / QUIET)
             first = min(max(first, math.ceil(math.log2(least / setup.tick))), longest)
+        longest += self._n_longer
         k, n_y, n_x = longest - first + 1, (2 * s - 1) * n_row, self.motion.shape[1]
         return Tables(
             first_level=first,
@@ -271,6 +275,18 @@ class FlightModes:
             end=np.zeros((k, s * n_row, n_x)),
             fade=np.zeros((k, s, 4)),
         )
+
+    @property
+    def _n_longer(self) -> int:
+        """Levels by which steps without a tangent are longer."""
+        return LONGER_IN_BORES if any(stator.is_bore for stator in self.setup.model.stators) else 0
+
+    @cached_property
+    def tangent_tables(self) -> Tables:
+        """Those of the steps that a tangent takes: the error of forces does not see that of small changes."""
+        tables, n = self.tables, self._n_longer
+        arrays = {name: value for name, value in tables._asdict().items() if isinstance(value, np.ndarray)}
+        return tables._replace(**{name: value[: len(value) - n] for name, value in arrays.items()})
 
     @cached_property
     def power(self) -> Complexes:

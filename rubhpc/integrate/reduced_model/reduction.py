@@ -189,6 +189,15 @@ def reduce_to(
     )
 
 
+def reduced_sag(model: Model, reduced: ReducedModel) -> Floats:
+    """Sag (n_dof,), m, of a rotor of little stiffness: in reduced coordinates, whose stiffness holds it."""
+    n = model.rotor.n_dof
+    basis, project = reduced.basis[:n], reduced.project[:, :n]
+    rests = np.linalg.solve(reduced.stiffness, basis.T @ model.load)
+    sag: Floats = model.sag + basis @ (rests - project @ model.sag)
+    return sag
+
+
 def bending_loads(model: Model) -> Floats:
     """Forces on each bent stator, (n_all, n_bent), where a lateral force at its tip meets an axial one.
 

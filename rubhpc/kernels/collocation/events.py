@@ -22,7 +22,7 @@ from rubhpc.kernels.collocation.structures import (
     Nodes,
     Solution,
 )
-from rubhpc.kernels.collocation.tables import rate_row
+from rubhpc.kernels.collocation.tables import place_row, rate_row
 from rubhpc.kernels.laws import LAGRANGE, PENALTY
 
 Floats = NDArray[np.float64]
@@ -82,6 +82,15 @@ def root_between(
 
 
 @linked_sum
+def is_near(i: int, solution: Solution) -> bool:
+    """Whether a pair is closed or may touch in the step that was solved last."""
+    is_listed = False
+    for p in range(solution.used[1]):
+        is_listed = is_listed or solution.closed[p] == i
+    return is_listed
+
+
+@linked_sum
 def fill_events(
     bodies: Bodies, nodes: Nodes, state: Ints, force: Floats, accuracy: float, solution: Solution
 ) -> None:
@@ -93,9 +102,11 @@ def fill_events(
             row = i * s + k
             event[i, NORMAL, k], event[i, FRICTION, k] = 1.0, 1.0
             if state[i] == OPEN:
-                at, v = (solution.start, first) if k == 0 else (solution.y, (k - 1) * n_row + first)
+                if not is_near(i, solution):
+                    continue
+                at, v = (solution.start, first) if k == 0 else (solution.y, place_row(s, n_local, i, k))
                 see_gap(bodies, i, at, v, row, solution)
-                v = n_row + first if k == 0 else rate_row(s, n_row, k) + first
+                v = n_row + first if k == 0 else rate_row(s, n_local, i, k)
                 rate = 0.0
                 for a in range(n_local):
                     rate += solution.normal[row, a] * at[v + a]

@@ -516,7 +516,7 @@ def advance_by_collocation(
             if not tables.is_filled[slot]:
                 fill_step(bodies, nodes, tables, slot)
             step = tables.tick * 2.0 ** (tables.first_level + slot)
-            is_exact = trail is not None and todo == STEPPING
+            is_exact = trail is not None and trail.columns.shape[1] > 0 and todo == STEPPING
             is_whole = is_recorded or bodies.is_sticky or is_exact or state.size > 1
             n_iteration = take_step(
                 bodies,
@@ -582,7 +582,7 @@ def advance_by_collocation(
                     case.force,
                     solution.guess,
                     is_continued,
-                    solution.noise[slot],
+                    solution.noise[solution.used[0]],
                     solution,
                 )
                 error *= min(1.0, step / AVERAGED)
@@ -616,7 +616,7 @@ def advance_by_collocation(
                         taken = max(taken, 1)  # what opens does not touch at once: such touches have no end
             else:
                 pair = -1
-            if taken == 0 and kind == FRICTION and memory.n_at_once > UNDECIDED * state.size and pair >= 0:
+            if taken == 0 and memory.n_at_once > UNDECIDED * state.size and pair >= 0:
                 taken, pair = whole, -1
             if progress.tick + taken > last_tick:
                 taken, pair = last_tick - progress.tick, -1

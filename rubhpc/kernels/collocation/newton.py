@@ -1,7 +1,8 @@
 """A step of closed contacts: forces that obey the laws at the nodes, by Newton's method.
 
 Unknown are the forces of the closed pairs at the nodes, N and, unless friction is a constant multiple of it,
-T; and the local displacements at the nodes after the first, by which the loads turn. The equations are
+T; and, where gaps are curved, the local displacements at the nodes after the first, by which the loads turn.
+Straight gaps with linear laws need one iteration. The equations are
 
 - hard contact: `gap = faded error` at the nodes after the first, and the rate of it at the end;
 - springs: `N = law(gap, rate)` at the nodes after the first, and its rate at the end;
@@ -11,6 +12,8 @@ T; and the local displacements at the nodes after the first, by which the loads 
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +49,7 @@ from rubhpc.kernels.collocation.structures import (
     Solution,
     Tables,
 )
-from rubhpc.kernels.collocation.tables import bend_row, rate_row
+from rubhpc.kernels.collocation.tables import bend_row, place_row, rate_row
 from rubhpc.kernels.laws import HERTZ, LAGRANGE
 
 Floats = NDArray[np.float64]
@@ -121,7 +124,8 @@ def list_closed(bodies: Bodies, nodes: Nodes, state: Ints, solution: Solution) -
             solution.closed[n_closed] = i
             n_closed += 1
             n_unknown += s * n_force(bodies, state[i])
-    return n_closed, n_unknown, n_unknown + n_closed * (s - 1) * (bodies.n_local - 1)
+    n_place = 0 if bodies.is_straight else n_closed * (s - 1) * (bodies.n_local - 1)
+    return n_closed, n_unknown, n_unknown + n_place
 
 
 @linked_sum
@@ -160,38 +164,119 @@ def push_closed(
 
 
 @linked_sum
-def move_freely(rows: Floats, x: Floats, begin: int, end: int, solution: Solution) -> None:
-    """Rows of y from one to another without loads."""
-    y_free = solution.y_free
-    for r in range(begin, end):
-        row, total = rows[r], 0.0
-        for k in range(x.size):
-            total += row[k] * x[k]
-        y_free[r] = total
+def move_freely(
+    bodies: Bodies,
+    s: int,
+    free: Floats,
+    x: Floats,
+    blocks: tuple[int, int],
+    pairs: tuple[int, int],
+    y: Floats,
+    solution: Solution,
+) -> None:
+    """Motions y of listed pairs without loads, in blocks of y: displacements at the nodes, and so on."""
+    n_local = bodies.n_local
+    for p in range(pairs[0], pairs[1]):
+        first = place_row(s, n_local, solution.closed[p], 1)
+        for r in range(first + blocks[0] * n_local, first + blocks[1] * n_local):
+            row, total = free[r], 0.0
+            for k in range(x.size):
+                total += row[k] * x[k]
+            y[r] = total
+
+
+@linked_sum
+def add_response(
+    bodies: Bodies,
+    s: int,
+    size: float,
+    row: Floats,
+    blocks: tuple[int, int],
+    pairs: tuple[int, int],
+    y: Floats,
+    solution: Solution,
+) -> None:
+    """Add the response to a load, of a row of `Tables.forced`, to blocks of y of listed pairs."""
+    n_local = bodies.n_local
+    for p in range(pairs[0], pairs[1]):
+        first = place_row(s, n_local, solution.closed[p], 1)
+        for r in range(first + blocks[0] * n_local, first + blocks[1] * n_local):
+            y[r] += size * row[r]
 
 
 @linked_sum
 def respond(
-    tables: Tables,
-    slot: int,
-    n_row: int,
-    n_local: int,
+    bodies: Bodies,
+    s: int,
+    forced: Floats,
     n_closed: int,
-    begin: int,
-    end: int,
+    blocks: tuple[int, int],
+    pairs: tuple[int, int],
+    load: Floats,
     solution: Solution,
 ) -> None:
-    """Rows of y from one to another under the loads of the closed pairs."""
-    y, y_free, forced, load = solution.y, solution.y_free, tables.forced[slot], solution.load
-    for r in range(begin, end):
-        y[r] = y_free[r]
-    for k in range(load.size // n_row):
-        for c in range(n_closed):
-            first = k * n_row + solution.closed[c] * n_local
-            for a in range(first, first + n_local):
-                f, row = load[a], forced[a]
-                for r in range(begin, end):
-                    y[r] += f * row[r]
+    """Motions y of listed pairs under the loads of the closed ones, in blocks of y."""
+    n_local, n_row, closed, y = bodies.n_local, bodies.load.shape[0], solution.closed, solution.y
+    for p in range(pairs[0], pairs[1]):
+        first = place_row(s, n_local, closed[p], 1)
+        begin, end = first + blocks[0] * n_local, first + blocks[1] * n_local
+        for r in range(begin, end):
+            y[r] = solution.y_free[r]
+        for node in range(0, load.size, n_row):
+            for c in range(n_closed):
+                begun = node + closed[c] * n_local
+                for a in range(begun, begun + n_local):
+                    size, row = load[a], forced[a]
+                    for r in range(begin, end):
+                        y[r] += size * row[r]
+
+
+@linked_sum
+def list_near(
+    bodies: Bodies, nodes: Nodes, step: float, x: Floats, state: Ints, n_closed: int, solution: Solution
+) -> int:
+    """List the open pairs that may touch within a step, after the closed ones; returns the number of all.
+
+    Bounds of the accelerations are those of a flight, and for each load its size and how much it changes in
+    the step times the sum of what the modes respond.
+    """
+    s, n_local, n_row, n = nodes.at.size, bodies.n_local, bodies.load.shape[0], n_closed
+    if n_closed == state.size:
+        return n
+    size, n_complex, start, load = solution.size, bodies.n_complex, solution.start, solution.load
+    for k in range(n_complex):
+        size[k] = math.sqrt(x[k] * x[k] + x[n_complex + k] * x[n_complex + k])
+    for k in range(n_complex, size.size):
+        size[k] = abs(x[n_complex + k])
+    for c in range(n_closed):
+        first = solution.closed[c] * n_local
+        for a in range(first, first + n_local):
+            total = abs(load[a])
+            for k in range(1, s):
+                total += abs(load[k * n_row + a] - load[(k - 1) * n_row + a])
+            solution.begun[a] = total
+    for i in range(state.size):
+        if state[i] != OPEN:
+            continue
+        first, rate, bound = i * n_local, 0.0, 0.0
+        see_gap(bodies, i, start, first, i * s, solution)
+        for a in range(n_local):
+            slope, total = solution.normal[i * s, a], 0.0
+            if slope != 0.0:
+                bend, reach = bodies.bend[first + a], bodies.reach[first + a]
+                for k in range(size.size):
+                    total += bend[k] * size[k]
+                for c in range(n_closed):
+                    begun = solution.closed[c] * n_local
+                    for b in range(begun, begun + n_local):
+                        total += reach[b] * solution.begun[b]
+                rate += slope * start[n_row + first + a]
+                bound += abs(slope) * total
+        least = solution.gap[i * s] + step * (min(rate, 0.0) - 0.5 * bound * step)
+        if bodies.radius[i] < 0.0 or least <= 0.0:  # the gap of a bore is not convex
+            solution.closed[n] = i
+            n += 1
+    return n
 
 
 @linked_sum
@@ -208,11 +293,11 @@ def see_pair(bodies: Bodies, nodes: Nodes, i: int, is_lean: bool, solution: Solu
         seen[GAP] = solution.gap[row]
         if k > 0:
             moved = solution.place[k, first + ACROSS] - solution.place[0, first + ACROSS]
-            twisted = solution.y[(k - 1) * n_row + first + TWIST] - solution.start[first + TWIST]
+            twisted = solution.y[place_row(s, n_local, i, k) + TWIST] - solution.start[first + TWIST]
             seen[TURNED] = twisted - slip_path(bodies, i, row, i * s, moved, solution)
         if is_lean and 0 < k < s - 1:
             continue
-        rates, v = (solution.start, n_row + first) if k == 0 else (solution.y, rate_row(s, n_row, k) + first)
+        rates, v = (solution.start, n_row + first) if k == 0 else (solution.y, rate_row(s, n_local, i, k))
         rate, across = 0.0, 0.0
         for a in range(n_local):
             rate += normal[a] * rates[v + a]
@@ -222,7 +307,7 @@ def see_pair(bodies: Bodies, nodes: Nodes, i: int, is_lean: bool, solution: Solu
         seen[WIDENED] = seen[GAP] * solution.curvature[row] * across
         if is_last and not is_hard:
             see_bend(bodies, row, solution)
-            total, at = 0.0, bend_row(s, n_row) + first
+            total, at = 0.0, bend_row(s, n_local, i)
             for a in range(n_local):
                 total += normal[a] * solution.y[at + a]
                 for b in range(n_local):
@@ -243,7 +328,7 @@ def fill_residual(
     solution: Solution,
 ) -> None:
     """Fill the residuals of all equations."""
-    s, n_local, n_row, residual = nodes.at.size, bodies.n_local, bodies.load.shape[0], solution.residual
+    s, n_local, residual = nodes.at.size, bodies.n_local, solution.residual
     step, fade, row = tables.tick * 2.0 ** (tables.first_level + slot), tables.fade[slot], 0
     for c in range(n_closed):
         i = solution.closed[c]
@@ -281,13 +366,13 @@ def fill_residual(
             for k in range(s):
                 residual[row + k] = t[k] - state[i] * friction_ratio(bodies, i, seen[k, SLIP])[0] * n[k]
             row += s
-    for c in range(n_closed):
-        first_row = solution.closed[c] * n_local
+    for c in range(0 if bodies.is_straight else n_closed):
+        i = solution.closed[c]
         for k in range(1, s):
+            at = place_row(s, n_local, i, k)
             for a in range(n_local):
                 if a != TWIST:
-                    at = first_row + a
-                    residual[row] = solution.place[k, at] - solution.y[(k - 1) * n_row + at]
+                    residual[row] = solution.place[k, i * n_local + a] - solution.y[at + a]
                     row += 1
 
 
@@ -312,9 +397,7 @@ def fill_slopes(
                 solution.direction[row, FRICTION, a] = tangent[a]
                 for b in range(n_local):
                     solution.turning[row, a, b] = n * of_normal[a, b] + t * of_tangent[a, b]
-            rates, v = (
-                (solution.start, n_row + first) if k == 0 else (solution.y, rate_row(s, n_row, k) + first)
-            )
+            rates, v = (solution.start, n_row + first) if k == 0 else (solution.y, rate_row(s, n_local, i, k))
             bent = solution.bent[row]
             for a in range(n_local):
                 of_rate, of_slip = 0.0, 0.0
@@ -329,7 +412,7 @@ def fill_slopes(
             if bodies.normal_law[i] != LAGRANGE:
                 fill_spring_slopes(bodies, i, row, solution)
                 if is_last and bodies.damping[i] > 0.0:
-                    fill_bend_slope(bodies, i, row, v, bend_row(s, n_row) + first, solution)
+                    fill_bend_slope(bodies, i, row, v, bend_row(s, n_local, i), solution)
 
 
 @linked_sum
@@ -403,8 +486,8 @@ def change_pair(
         for a in range(n_local):
             gap += normal[a] * moved[k, first + a]
         changed[GAP] = gap
-        rates, v = (begun, n_row + first) if k == 0 else (change, rate_row(s, n_row, k) + first)
-        twist = begun[first + TWIST] if k == 0 else change[(k - 1) * n_row + first + TWIST]
+        rates, v = (begun, n_row + first) if k == 0 else (change, rate_row(s, n_local, i, k))
+        twist = begun[first + TWIST] if k == 0 else change[place_row(s, n_local, i, k) + TWIST]
         rate, across, turned, sideways = 0.0, 0.0, 0.0, 0.0
         for a in range(n_local):
             rate += normal[a] * rates[v + a] + bent[OF_RATE, a] * moved[k, first + a]
@@ -422,7 +505,7 @@ def change_pair(
         widened = (1.0 - seen[GAP] * bow) * (seen[WIDENED] / seen[GAP] if seen[GAP] != 0.0 else 0.0)
         changed[WIDENED] = widened * gap + seen[GAP] * bow * across
         if is_last and not is_hard:
-            total, at = 0.0, bend_row(s, n_row) + first
+            total, at = 0.0, bend_row(s, n_local, i)
             for a in range(n_local):
                 total += normal[a] * change[at + a] + 2.0 * bent[OF_RATE, a] * rates[v + a]
                 total += bent[OF_BEND, a] * moved[k, first + a]
@@ -499,28 +582,32 @@ def fill_column(
     force: Floats,
     n_closed: int,
     col: int,
-    n: int,
     solution: Solution,
 ) -> None:
     """Fill a column of the matrix by the changes `change`, `moved` and `pushed` of one unknown."""
-    s, n_local, n_row = nodes.at.size, bodies.n_local, bodies.load.shape[0]
-    target, row = solution.residual, 0
+    s, n_local, row = nodes.at.size, bodies.n_local, 0
+    target, change, moved = solution.residual, solution.change, solution.moved
+    if bodies.is_straight:
+        for c in range(n_closed):
+            i = solution.closed[c]
+            for k in range(1, s):
+                for a in range(n_local):
+                    moved[k, i * n_local + a] = change[place_row(s, n_local, i, k) + a]
     for c in range(n_closed):
         i = solution.closed[c]
-        change_pair(bodies, nodes, i, 1, solution.begun, solution.change, solution.moved, solution)
+        change_pair(bodies, nodes, i, 1, solution.begun, change, moved, solution)
         row = change_residual(
             bodies, nodes, tables, slot, state, force, i, solution.pushed[i], row, target, solution
         )
-    for c in range(n_closed):
-        first = solution.closed[c] * n_local
+    for c in range(0 if bodies.is_straight else n_closed):
+        i = solution.closed[c]
         for k in range(1, s):
             for a in range(n_local):
                 if a != TWIST:
-                    at = first + a
-                    target[row] = solution.moved[k, at] - solution.change[(k - 1) * n_row + at]
+                    target[row] = moved[k, i * n_local + a] - change[place_row(s, n_local, i, k) + a]
                     row += 1
-    matrix = solution.matrix[slot]
-    for r in range(n):
+    matrix = solution.matrix[solution.used[0]]
+    for r in range(row):
         matrix[r, col] = target[r]
 
 
@@ -533,8 +620,7 @@ def fill_matrix(
     state: Ints,
     force: Floats,
     n_closed: int,
-    n: int,
-    n_used: int,
+    blocks: tuple[int, int],
     solution: Solution,
 ) -> bool:
     """Make the matrix of the equations, and its factors; False where it is singular."""
@@ -546,6 +632,7 @@ def fill_matrix(
         solution.pushed,
         0,
     )
+    listed = (0, n_closed)
     fill_slopes(bodies, nodes, state, force, n_closed, solution)
     for r in range(solution.begun.size):
         solution.begun[r] = 0.0
@@ -561,41 +648,38 @@ def fill_matrix(
         i = solution.closed[c]
         for f in range(n_force(bodies, state[i])):
             for k in range(s):
-                for r in range(n_used):
+                for r in range(change.size):
                     change[r] = 0.0
                 for a in range(n_local):
-                    size, rows = solution.direction[i * s + k, f, a], forced[k * n_row + i * n_local + a]
-                    for r in range(n_used):
-                        change[r] += size * rows[r]
+                    size, row = solution.direction[i * s + k, f, a], forced[k * n_row + i * n_local + a]
+                    add_response(bodies, s, size, row, blocks, listed, change, solution)
                 pushed[i, f, k] = 1.0
-                fill_column(bodies, nodes, tables, slot, state, force, n_closed, col, n, solution)
+                fill_column(bodies, nodes, tables, slot, state, force, n_closed, col, solution)
                 pushed[i, f, k] = 0.0
                 col += 1
-    for c in range(n_closed):
+    for c in range(0 if bodies.is_straight else n_closed):
         i = solution.closed[c]
         for k in range(1, s):
             for b in range(n_local):
                 if b == TWIST:
                     continue
-                for r in range(n_used):
+                for r in range(change.size):
                     change[r] = 0.0
                 for a in range(n_local):
-                    size, rows = solution.turning[i * s + k, a, b], forced[k * n_row + i * n_local + a]
+                    size, row = solution.turning[i * s + k, a, b], forced[k * n_row + i * n_local + a]
                     if size != 0.0:
-                        for r in range(n_used):
-                            change[r] += size * rows[r]
+                        add_response(bodies, s, size, row, blocks, listed, change, solution)
                 moved[k, i * n_local + b] = 1.0
-                fill_column(bodies, nodes, tables, slot, state, force, n_closed, col, n, solution)
+                fill_column(bodies, nodes, tables, slot, state, force, n_closed, col, solution)
                 moved[k, i * n_local + b] = 0.0
                 col += 1
-    return factorise(solution.matrix[slot], solution.pivot[slot], n)
+    return factorise(solution.matrix[solution.used[0]], solution.pivot[solution.used[0]], col)
 
 
 @linked_sum
 def noise_of(
     bodies: Bodies,
     nodes: Nodes,
-    slot: int,
     state: Ints,
     n_closed: int,
     n_pushed: int,
@@ -616,7 +700,7 @@ def noise_of(
                 for k in range(s):
                     residual[row + k] = ROUNDING * size * (1.0 if k % 2 == 0 else -1.0)
             row += s
-    solve_factorised(solution.matrix[slot], solution.pivot[slot], n, residual)
+    solve_factorised(solution.matrix[solution.used[0]], solution.pivot[solution.used[0]], n, residual)
     noise = 0.0
     for r in range(n_pushed):
         noise = max(noise, abs(residual[r]))
@@ -630,6 +714,42 @@ def code_of(state: Ints) -> int:
     for i in range(state.size):
         code = code * 7 + state[i] + 2
     return code
+
+
+@linked_sum
+def use_matrix(bodies: Bodies, tables: Tables, slot: int, state: Ints, solution: Solution) -> int:
+    """Point at the matrix of a length of step and of states, with which it is made unless it was so before.
+
+    Of straight gaps several are kept for each length of step: they do not change with the motion.
+    """
+    code = code_of(state)
+    n_way = solution.states.size // tables.is_filled.size
+    way = code % n_way if bodies.is_straight else 0
+    used = slot * n_way + way
+    if solution.states[used] != code:
+        solution.states[used] = 0
+    solution.used[0] = used
+    return code
+
+
+@linked_sum
+def see_gaps(bodies: Bodies, nodes: Nodes, n_closed: int, solution: Solution) -> None:
+    """See the gaps of the closed pairs at the displacements of the nodes after the first."""
+    for c in range(n_closed):
+        i = solution.closed[c]
+        for k in range(1, nodes.at.size):
+            see_gap(bodies, i, solution.place[k], i * bodies.n_local, i * nodes.at.size + k, solution)
+
+
+@linked_sum
+def follow_loads(bodies: Bodies, nodes: Nodes, n_closed: int, solution: Solution) -> None:
+    """Take the displacements of the closed pairs at the nodes from y."""
+    s, n_local = nodes.at.size, bodies.n_local
+    for c in range(n_closed):
+        i = solution.closed[c]
+        for k in range(1, s):
+            for a in range(n_local):
+                solution.place[k, i * n_local + a] = solution.y[place_row(s, n_local, i, k) + a]
 
 
 @linked_sum
@@ -653,24 +773,20 @@ def take_step(
     is that at the solution, for the tangent.
     """
     s, n_local, n_row = nodes.at.size, bodies.n_local, bodies.load.shape[0]
-    n_y = (2 * s - 1) * n_row
     n_closed, n_pushed, n = list_closed(bodies, nodes, state, solution)
-    place, y = solution.place, solution.y
-    matrix, pivot, residual, load = (
-        solution.matrix[slot],
-        solution.pivot[slot],
-        solution.residual,
-        solution.load,
-    )
-    is_lean = not bodies.is_varied
+    place, residual, load, states = solution.place, solution.residual, solution.load, solution.states
+    is_lean, is_linear = not bodies.is_varied, bodies.is_straight and not bodies.is_varied
     for c in range(n_closed):
-        is_lean = is_lean and bodies.normal_law[solution.closed[c]] == LAGRANGE
-    n_used = s * n_row if is_lean else n_y
-    code = code_of(state)
-    if solution.states[slot] != code:
-        solution.states[slot] = 0
+        law = bodies.normal_law[solution.closed[c]]
+        is_lean, is_linear = is_lean and law == LAGRANGE, is_linear and law != HERTZ
+    n_block, free = 2 * s - 1, tables.free[slot]
+    used_blocks = (0, s if is_lean else n_block)
+    step, forced = tables.tick * 2.0 ** (tables.first_level + slot), tables.forced[slot]
+    code = use_matrix(bodies, tables, slot, state, solution)
+    used = solution.used[0]
     see_motions(bodies, x, 2 * n_row, solution)
-    move_freely(tables.free[slot], x, int(np.int64(0)), n_used, solution)
+    listed = (0, n_closed)
+    move_freely(bodies, s, free, x, used_blocks, listed, solution.y_free, solution)
     for a in range(load.size):
         load[a] = 0.0
     for r in range(n_row):
@@ -680,45 +796,50 @@ def take_step(
         for k in range(s):
             see_gap(bodies, i, place[0], i * n_local, i * s + k, solution)
     push_closed(bodies, nodes, state, force, n_closed, solution)
-    respond(tables, slot, n_row, n_local, n_closed, int(np.int64(0)), n_used, solution)
-    for c in range(n_closed):
-        first = solution.closed[c] * n_local
-        for k in range(1, s):
-            for a in range(first, first + n_local):
-                place[k, a] = y[(k - 1) * n_row + a]
+    respond(bodies, s, forced, n_closed, used_blocks, listed, load, solution)
+    follow_loads(bodies, nodes, n_closed, solution)
     last, largest, iteration, is_solved, is_fresh = np.inf, 0.0, 0, False, False
     while iteration < MOST_ITERATIONS:
         iteration += 1
-        for c in range(n_closed):
-            i = solution.closed[c]
-            for k in range(1, s):
-                see_gap(bodies, i, place[k], i * n_local, i * s + k, solution)
-        push_closed(bodies, nodes, state, force, n_closed, solution)
-        respond(tables, slot, n_row, n_local, n_closed, int(np.int64(0)), n_used, solution)
+        if not bodies.is_straight:
+            see_gaps(bodies, nodes, n_closed, solution)
+        if not bodies.is_straight or iteration > 1:
+            push_closed(bodies, nodes, state, force, n_closed, solution)
+            respond(bodies, s, forced, n_closed, used_blocks, listed, load, solution)
+        if bodies.is_straight:
+            follow_loads(bodies, nodes, n_closed, solution)
+            see_gaps(bodies, nodes, n_closed, solution)
         if is_solved:
-            if is_whole and is_lean:
-                move_freely(tables.free[slot], x, n_used, n_y, solution)
-                respond(tables, slot, n_row, n_local, n_closed, n_used, n_y, solution)
+            if is_whole:
+                n_near = list_near(bodies, nodes, step, x, state, n_closed, solution)
+                near, rest = (0, n_near), (used_blocks[1] if n_near == n_closed else 0, n_block)
+                move_freely(bodies, s, free, x, (used_blocks[1], n_block), listed, solution.y_free, solution)
+                move_freely(bodies, s, free, x, (0, n_block), (n_closed, n_near), solution.y_free, solution)
+                respond(bodies, s, forced, n_closed, rest, near, load, solution)
+                solution.used[1] = n_near
             for c in range(n_closed):
                 see_pair(bodies, nodes, solution.closed[c], is_lean and not is_whole, solution)
             if not is_exact:
                 return iteration
+            if is_linear:
+                fill_slopes(bodies, nodes, state, force, n_closed, solution)
+                return iteration
         fill_residual(bodies, nodes, tables, slot, state, force, n_closed, is_lean, solution)
-        if solution.states[slot] == 0 or is_solved:
-            if not fill_matrix(bodies, nodes, tables, slot, state, force, n_closed, n, n_used, solution):
-                solution.states[slot] = 0
+        if states[used] == 0 or is_solved:
+            states[used] = 0
+            if not fill_matrix(bodies, nodes, tables, slot, state, force, n_closed, used_blocks, solution):
                 return -iteration
-            solution.states[slot], is_fresh = code, True
-            solution.noise[slot] = noise_of(bodies, nodes, slot, state, n_closed, n_pushed, n, solution)
+            states[used], is_fresh = code, True
+            solution.noise[used] = noise_of(bodies, nodes, state, n_closed, n_pushed, n, solution)
             if is_solved:
                 return iteration
             fill_residual(bodies, nodes, tables, slot, state, force, n_closed, is_lean, solution)
-        solve_factorised(matrix, pivot, n, residual)
+        solve_factorised(solution.matrix[used], solution.pivot[used], n, residual)
         change, largest, row = 0.0, 0.0, 0
         for r in range(n_pushed):
             change = max(change, abs(residual[r]))
         if not change < 1e200:
-            solution.states[slot] = 0
+            states[used] = 0
             return -iteration
         for c in range(n_closed):
             i = solution.closed[c]
@@ -728,20 +849,20 @@ def take_step(
                     if f == NORMAL:
                         largest = max(largest, abs(force[i, f, k]))
                 row += s
-        for c in range(n_closed):
+        for c in range(0 if bodies.is_straight else n_closed):
             first = solution.closed[c] * n_local
             for k in range(1, s):
                 for a in range(n_local):
                     if a != TWIST:
                         place[k, first + a] -= residual[row]
                         row += 1
-        floor = max(tolerance, solution.noise[slot])
-        if change <= floor or (iteration > 1 and change * min(1.0, change / last) <= tolerance):
+        floor = max(tolerance, solution.noise[used])
+        if is_linear or change <= floor or (iteration > 1 and change * min(1.0, change / last) <= tolerance):
             is_solved = True
         elif iteration > 3 and change > 0.1 * last and (change < 1e-7 * largest or change < 30.0 * floor):
             is_solved = True  # rounding: no further progress
         elif iteration > 1 and change > SLOW * last and (not is_fresh or iteration > 2):
-            solution.states[slot] = 0
+            states[used] = 0
         last, is_fresh = change, False
-    solution.states[slot] = 0
+    states[used] = 0
     return -iteration

@@ -53,7 +53,9 @@ class Bodies(Struct):
     kick: Floats  # (R, nx), the same of the coordinates
     bend: Floats  # (R, nm), bound on the acceleration of a local motion by a unit mode, 1/s2
     compliance: Floats  # (R, R), acceleration of a local motion by a unit load, 1/kg
+    reach: Floats  # (R, R), the sum of what each mode contributes to it, in size
     kind: Ints  # (q,), FIXED or ROUND
+    is_straight: bool  # all gaps are linear in the local motions
     radius: Floats  # (q,), of the rim, m; of a bore its clearance, negative
     clearance: Floats  # (q,), along the axis at rest, m
     aside: Floats  # (q,), of the tip at rest from the axis through the disc, m
@@ -74,8 +76,8 @@ class Bodies(Struct):
 class Tables(Struct):
     """Steps of 2^(first_level + slot) ticks, filled when first taken.
 
-    Rows y of a step: local displacements at the nodes after the first, velocities at the last node, then at
-    those between, accelerations at the last (`rate_row`).
+    Rows y of a step: of each pair the local displacements at the nodes after the first, velocities at the
+    last node, then at those between, and accelerations at the last (`tables.row_of`).
     """
 
     first_level: int
@@ -117,11 +119,13 @@ class Solution(Struct):
     turning: Floats  # (s q, n_local, n_local), change of a load with the local motions
     direction: Floats  # (s q, 2, n_local), of unknown forces
     residual: Floats  # (n,)
-    closed: Ints  # (q,), the closed pairs
-    matrix: Floats  # (k, n, n), factors
-    pivot: Ints  # (k, n)
-    states: Ints  # (k,), states of the pairs with which a matrix was made, as one number; 0: none
-    noise: Floats  # (k,), force that the rounding of displacements causes, N
+    closed: Ints  # (q,), the closed pairs, then open ones that may touch in the step
+    size: Floats  # (nm,), of modes
+    matrix: Floats  # (k m, n, n), factors: m of each length of step
+    pivot: Ints  # (k m, n)
+    states: Ints  # (k m,), states of the pairs with which a matrix was made, as one number; 0: none
+    noise: Floats  # (k m,), force that the rounding of displacements causes, N
+    used: Ints  # (2,), matrix of the last step, and number of pairs that are closed or may touch in it
     change: Floats  # (ny,), of y
     moved: Floats  # (s, R), of `place`
     begun: Floats  # (3 R,), of `start`

@@ -35,7 +35,7 @@ def fill_phi(x: complex, phi: Complexes) -> None:
     s = phi.size - 1
     phi[0] = np.exp(x)
     factorial = 1.0
-    if abs(x) < SERIES:
+    if x.real * x.real + x.imag * x.imag < SERIES * SERIES:  # an absolute value takes ten times as long
         for k in range(2, s + 1):
             factorial *= k
         total = 1.0 / factorial + 0j
@@ -43,7 +43,7 @@ def fill_phi(x: complex, phi: Complexes) -> None:
         for k in range(1, MOST_TERMS):
             term *= x / (s + k)
             total += term
-            if abs(term) < 1e-17 * abs(total):
+            if abs(term.real) + abs(term.imag) < 1e-17 * abs(total.real):
                 break
         phi[s] = total
         for k in range(s - 1, 0, -1):
@@ -57,15 +57,30 @@ def fill_phi(x: complex, phi: Complexes) -> None:
 
 
 @linked_sum
-def rate_row(s: int, n_row: int, node: int) -> int:
-    """First row of `y` with the velocities at a node after the first."""
-    return (s - 1) * n_row + (0 if node == s - 1 else node * n_row)
+def place_row(s: int, n_local: int, pair: int, node: int) -> int:
+    """First row of `y` with the displacements of a pair at a node after the first."""
+    return (pair * (2 * s - 1) + node - 1) * n_local
 
 
 @linked_sum
-def bend_row(s: int, n_row: int) -> int:
-    """First row of `y` with the accelerations at the end."""
-    return (2 * s - 2) * n_row
+def rate_row(s: int, n_local: int, pair: int, node: int) -> int:
+    """First row of `y` with the velocities of a pair at a node after the first."""
+    return (pair * (2 * s - 1) + s - 1 + (0 if node == s - 1 else node)) * n_local
+
+
+@linked_sum
+def bend_row(s: int, n_local: int, pair: int) -> int:
+    """First row of `y` with the accelerations of a pair at the end."""
+    return (pair * (2 * s - 1) + 2 * s - 2) * n_local
+
+
+@linked_sum
+def row_of(s: int, n_local: int, r: int, kind: int, node: int) -> int:
+    """Row of `y` of a local motion at a node: its displacement, velocity or acceleration (`kind`)."""
+    pair, a = r // n_local, r % n_local
+    if kind == 0:
+        return place_row(s, n_local, pair, node) + a
+    return (rate_row(s, n_local, pair, node) if kind == 1 else bend_row(s, n_local, pair)) + a
 
 
 @linked_sum
@@ -122,21 +137,15 @@ def fill_step(bodies: Bodies, nodes: Nodes, tables: Tables, slot: int) -> None:
                     if k < n_complex:
                         moved[j * n_row + r, n_complex + k] = value.imag
             for kind in range(n_kind):
-                row = (i - 1) * n_row
-                if kind > 0:
-                    row = rate_row(s, n_row, i) if kind == 1 else bend_row(s, n_row)
                 for r in range(n_row):
-                    at = kind * n_row + r
+                    at, row = kind * n_row + r, row_of(s, bodies.n_local, r, kind, i)
                     if k < n_complex:
                         a, b = local[at, k], local[at, n_complex + k]
-                        free[row + r, k] = a * turn.real + b * turn.imag
-                        free[row + r, n_complex + k] = b * turn.real - a * turn.imag
+                        free[row, k] = a * turn.real + b * turn.imag
+                        free[row, n_complex + k] = b * turn.real - a * turn.imag
                     else:
-                        free[row + r, re] = local[at, re] * turn.real
+                        free[row, re] = local[at, re] * turn.real
         for kind in range(n_kind):
-            row = (i - 1) * n_row
-            if kind > 0:
-                row = rate_row(s, n_row, i) if kind == 1 else bend_row(s, n_row)
             for col in range(s * n_row):
                 for r in range(n_row):
                     total = 0.0
@@ -144,7 +153,7 @@ def fill_step(bodies: Bodies, nodes: Nodes, tables: Tables, slot: int) -> None:
                         total += moved[col, k] * local[kind * n_row + r, k]
                     if kind == 2 and col >= (s - 1) * n_row:
                         total += bodies.compliance[r, col - (s - 1) * n_row]
-                    forced[col, row + r] = total
+                    forced[col, row_of(s, bodies.n_local, r, kind, i)] = total
         if is_last:
             for col in range(s * n_row):
                 for k in range(n_x):
@@ -189,12 +198,19 @@ def within_step(
     """Coordinates after a part of a step (s) under the loads of the whole; fills the factors `turn` (nm,)."""
     n_complex, n_row, s, power = bodies.n_complex, bodies.load.shape[0], nodes.at.size, nodes.power
     phi, monomial = np.empty(s + 1, np.complex128), np.zeros((s, n_row))
-    time, scale = step * part, step * part
+    time, scale, n_loaded, loaded = step * part, step * part, 0, np.empty(n_row, np.int64)
+    for r in range(n_row):
+        largest = 0.0
+        for j in range(s):
+            largest = max(largest, abs(load[j * n_row + r]))
+        if largest > 0.0:
+            loaded[n_loaded] = r
+            n_loaded += 1
     for m in range(s):
         for j in range(s):
             factor = power[j, m] * scale
-            for r in range(n_row):
-                monomial[m, r] += factor * load[j * n_row + r]
+            for p in range(n_loaded):
+                monomial[m, p] += factor * load[j * n_row + loaded[p]]
         scale *= part * (m + 1)
     for k in range(turn.size):
         fill_phi(bodies.exponent[k] * time, phi)
@@ -202,8 +218,8 @@ def within_step(
         total = 0j
         for m in range(s):
             pushed = 0j
-            for r in range(n_row):
-                pushed += bodies.load[r, k] * monomial[m, r]
+            for p in range(n_loaded):
+                pushed += bodies.load[loaded[p], k] * monomial[m, p]
             total += pushed * phi[m + 1]
         c, d = phi[0].real, phi[0].imag
         if k < n_complex:

@@ -24,9 +24,11 @@ from rubhpc.kernels.collocation.gaps import see_bend
 from rubhpc.kernels.collocation.impacts import find_forces, find_impulses, push_instant, see_rates
 from rubhpc.kernels.collocation.laws import static_friction
 from rubhpc.kernels.collocation.newton import (
+    add_response,
     change_pair,
     change_residual,
     list_closed,
+    move_freely,
     n_force,
     see_start,
     solve_factorised,
@@ -42,7 +44,7 @@ from rubhpc.kernels.collocation.structures import (
     Solution,
     Tables,
 )
-from rubhpc.kernels.collocation.tables import end_of_step, within_step
+from rubhpc.kernels.collocation.tables import end_of_step, place_row, row_of, within_step
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -105,8 +107,10 @@ def carry_step(
 ) -> None:
     """Carry the columns through a part of a step whose matrix is that at its solution."""
     s, n_local, n_row = nodes.at.size, bodies.n_local, bodies.load.shape[0]
+    has_place = not bodies.is_straight
     n_closed, _, n = list_closed(bodies, nodes, state, solution)
     step, n_x = tables.tick * 2.0 ** (tables.first_level + slot), trail.column.size
+    blocks, listed = (0, 2 * s - 1), (0, n_closed)
     change, moved, begun, pushed = solution.change, solution.moved, solution.begun, solution.pushed
     column, load, target = trail.column, trail.load, solution.residual
     forced, free, local = tables.forced[slot], tables.free[slot], bodies.local
@@ -121,26 +125,25 @@ def carry_step(
             for k in range(n_x):
                 total += local[r, k] * column[k]
             begun[r] = total
-        for r in range(change.size):
-            total = 0.0
-            for k in range(n_x):
-                total += free[r, k] * column[k]
-            change[r] = total
+        move_freely(bodies, s, free, column, blocks, listed, change, solution)
         for k in range(s):
             for r in range(n_row):
-                moved[k, r] = begun[r] if k == 0 else 0.0
+                moved[k, r] = 0.0
+                if k == 0:
+                    moved[k, r] = begun[r]
+                elif not has_place:
+                    moved[k, r] = change[row_of(s, n_local, r, 0, k)]
         for r in range(load.size):
             load[r] = 0.0
         for p in range(n_closed):  # loads turn with the motion at the first node
             i = solution.closed[p]
             first = i * n_local
-            for a in range(n_local):
+            for a in range(n_local if has_place else 0):
                 total = 0.0
                 for b in range(n_local):
                     total += solution.turning[i * s, a, b] * begun[first + b]
                 load[first + a] = total
-                for r in range(change.size):
-                    change[r] += total * forced[first + a, r]
+                add_response(bodies, s, total, forced[first + a], blocks, listed, change, solution)
         row = 0
         for p in range(n_closed):
             i = solution.closed[p]
@@ -148,14 +151,14 @@ def carry_step(
             row = change_residual(
                 bodies, nodes, tables, slot, state, force, i, pushed[i], row, target, solution
             )
-        for p in range(n_closed):
-            first = solution.closed[p] * n_local
+        for p in range(n_closed if has_place else 0):
             for k in range(1, s):
+                first = place_row(s, n_local, solution.closed[p], k)
                 for a in range(n_local):
                     if a != TWIST:
-                        target[row] = -change[(k - 1) * n_row + first + a]
+                        target[row] = -change[first + a]
                         row += 1
-        solve_factorised(solution.matrix[slot], solution.pivot[slot], n, target)
+        solve_factorised(solution.matrix[solution.used[0]], solution.pivot[solution.used[0]], n, target)
         row = 0
         for p in range(n_closed):
             i = solution.closed[p]
@@ -165,7 +168,7 @@ def carry_step(
                         at = k * n_row + i * n_local + a
                         load[at] -= solution.direction[i * s + k, f, a] * target[row]
                     row += 1
-        for p in range(n_closed):
+        for p in range(n_closed if has_place else 0):
             i = solution.closed[p]
             for k in range(1, s):
                 for b in range(n_local):
@@ -379,6 +382,8 @@ def note_event(
     """Note an event, unless there is no room; a force that begins has not turned yet."""
     if before == OPEN:
         trail.swing[HIGH, pair] = -np.inf
+    if trail.tick.size == 0:
+        return  # none is asked for
     k = trail.count[N_EVENT]
     if k == trail.tick.size:
         trail.count[FULL] = 1

@@ -377,3 +377,19 @@ def test_a_run_up_is_that_of_the_closed_form(law):
         assert one == pytest.approx(other, rel=0, abs=1e-3 * np.abs(other).max()), name
     work = known.friction_work.values
     assert found.friction_work.values == pytest.approx(work, rel=0, abs=1e-3 * work.max())
+
+
+def test_a_force_that_only_turns_takes_long_steps():
+    """A disc that is pressed around the wall of a bore: 32 steps a revolution."""
+    bore = rubhpc.Bore(node=8, radius=0.03, mass=0.5, stiffness=1e7, damping=1000.0)
+    rig = replace(rubhpc.read_rig("mokhtar2017"), stator=(bore,))
+    overrides = {"rotor.unbalance.mass": 0.02, "rotor.damping.alpha": 60.0}
+    given = {"speed": 200.0, "clearance": "50 um", "friction": 0.05, "overrides": overrides}
+    records = [
+        rubhpc.simulate(rig, **given, transient=30, revolutions=n, samples_per_revolution=32) for n in (4, 20)
+    ]
+    assert all(record.contact_fraction[0] == pytest.approx(1.0) for record in records)
+    assert 31 <= (records[1].measures["steps"] - records[0].measures["steps"]) / 16 <= 34
+    coarse, fine = records[0], rubhpc.simulate(rig, **given, transient=30, revolutions=4, accuracy=1e-6)
+    assert coarse.friction_work == pytest.approx(fine.friction_work, rel=1e-5)
+    assert coarse.peak_contact_force == pytest.approx(fine.peak_contact_force, rel=1e-4)
