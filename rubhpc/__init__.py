@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from rubhpc.rig.probes import Probe
     from rubhpc.rig.reading import read_rig
     from rubhpc.rig.rig import Rig
-    from rubhpc.rig.rotors import Load, Unbalance
+    from rubhpc.rig.rotors import Harmonic, Load, Unbalance
     from rubhpc.rig.stators import Bore, LumpedStator, MatrixStator, Stator
     from rubhpc.run_up import run_up
     from rubhpc.running.driver import run
@@ -45,6 +45,7 @@ __all__ = [
     "Bore",
     "Branch",
     "Carrier",
+    "Harmonic",
     "Identification",
     "InputError",
     "Load",
@@ -88,6 +89,7 @@ _HOMES = {
     "Bore": "rubhpc.rig.stators:Bore",
     "Branch": "rubhpc.integrate.branches.branch:Branch",
     "Carrier": "rubhpc.rig.carriers:Carrier",
+    "Harmonic": "rubhpc.rig.rotors:Harmonic",
     "Identification": "rubhpc.identification.identify:Identification",
     "InputError": "rubhpc.errors:InputError",
     "Load": "rubhpc.rig.rotors:Load",

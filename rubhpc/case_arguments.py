@@ -16,6 +16,7 @@ from rubhpc.input.fields import parse_field
 from rubhpc.input.messages import brief, nearest
 from rubhpc.input.quantity import parse_quantity
 from rubhpc.input.reading import build
+from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.record import State
 from rubhpc.integrate.setup import prepare
 from rubhpc.models import chosen
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 FRICTION = 0.3  # coefficient, where none is given
+_FRICTIONS = 8  # of a set-up, whose contact modes are kept for further cases
 AT_REST = Initial()
 
 
@@ -187,6 +189,8 @@ def _assembled(
         ),
         *("set-up", rig, spin, contact, integrator, samples_per_revolution, probes, drive),
     )
+    if isinstance(setup, ModalSetup):  # another friction may be asked for each time
+        setup.forget_but(_FRICTIONS)
     return Case(
         rig=rig,
         contact=contact,

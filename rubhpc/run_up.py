@@ -35,6 +35,7 @@ from rubhpc.schema import (
 from rubhpc.study.drive_keys import DriveKeys
 from rubhpc.study.drive_law import DriveLaw
 from rubhpc.study.initial import CONTACT_FREE
+from rubhpc.study.run_up_keys import check_forces
 from rubhpc.study.speed_law import SpeedLaw
 from rubhpc.study.tables import Recording
 from rubhpc.threads import on_one_thread
@@ -138,6 +139,7 @@ def run_up(
         probes=measured,
         drive=law if isinstance(law, DriveLaw) else None,
     )
+    check_forces(one.rig)
     if not isinstance(one.setup, ModalSetup):
         raise InputError(f'run_up: method: {case["method"]} keeps the speed constant; set method = "modal"')
     given_case: dict[str, Any] = {

@@ -153,7 +153,9 @@ def _alone(rig: Rig, i: int) -> Rig:
         stator if j == i else replace(stator, clearance_offset=stator.clearance_offset + _LEFT)
         for j, stator in enumerate(rig.stator)
     )
-    return replace(rig, stator=stators, rotor=replace(rig.rotor, unbalance=(), load=(), gravity=0.0))
+    return replace(
+        rig, stator=stators, rotor=replace(rig.rotor, unbalance=(), load=(), harmonic=(), gravity=0.0)
+    )
 
 
 def _prepare(rig: Rig, spin: float, contact: Contact) -> Setup:

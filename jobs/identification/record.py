@@ -31,7 +31,8 @@ rate = 200.37 * float(case["spin_speed"]) / (2 * np.pi)
 name = sys.argv[1]
 rubhpc.sense(case, sensors, rate=rate, seed=3).to_dataframe().to_csv(f"{name}.csv")
 Path(f"{name}.toml").write_text(
-    f'data = "{Path(name).name}.csv"\n[time]\ncolumn = "time"\n[speed]\ncolumn = "key_phasor"\nlevel = 2.5\n'
+    f'data = "{Path(name).name}.csv"\n[time]\ncolumn = "time"\n'
+    '[speed]\ncolumn = "key_phasor"\nlevel = 2.5\nangle = 0\n'
     + "".join(f'[signal.{signal}]\nunit = "{unit}"\n' for signal, unit in UNITS.items())
 )
 print(f"clearance {1e6 * float(case['clearance']):.4g} um")

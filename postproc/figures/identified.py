@@ -112,7 +112,7 @@ def predicted(tree: xr.DataTree) -> Drawing:
     names = [
         str(name).removeprefix("spectrum_") for name in draws.data_vars if str(name).startswith("spectrum_")
     ]
-    has_orbit = {"vertical", "horizontal"} <= set(names)
+    has_orbit = "orbit" in observed
 
     def draw(axes: list[Axes]) -> list[Axes]:
         for ax, name in zip(axes, names, strict=False):
@@ -138,21 +138,17 @@ def predicted(tree: xr.DataTree) -> Drawing:
         return axes
 
     n_panel = len(names) + has_orbit
-    shown = observed.drop_vars(
-        [str(name) for name in observed.data_vars if observed[name].dims == ("sample",)]
-    )
+    shown = observed.drop_dims("sample")
     rows = -(-n_panel // 2)
     return Drawing(shown=shown, draw=draw, panels=(rows, 2), is_shared=False, height=52.0 * rows, width=150.0)
 
 
 def _orbit(ax: Axes, observed: xr.Dataset, draws: xr.Dataset) -> None:
     """Predicted orbits over the measured one."""
-    scale = scale_of(observed["vertical"])
-    v, w = (observed[name].values * scale.factor for name in ("vertical", "horizontal"))
+    scale = scale_of(observed["orbit"])
+    v, w = observed["orbit"].values * scale.factor
     ax.plot(w, v, ".", color=_MEASURED, markersize=2.0)
-    for vertical, horizontal in zip(draws["vertical"].values, draws["horizontal"].values, strict=True):
-        ax.plot(
-            horizontal * scale.factor, vertical * scale.factor, color=_PREDICTED, linewidth=0.6, alpha=0.3
-        )
+    for vertical, horizontal in draws["orbit"].values * scale.factor:
+        ax.plot(horizontal, vertical, color=_PREDICTED, linewidth=0.6, alpha=0.3)
     ax.set(xlabel=scale.label("Horizontal"), ylabel=scale.label("Vertical"))
     ax.set_aspect("equal", adjustable="datalim")

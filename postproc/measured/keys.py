@@ -61,11 +61,12 @@ class SpeedKeys:
         of=("rising", "falling"), doc="Edge of the pulse that counts.", example='"falling"', default="rising"
     )
     per_revolution: int = count(doc="Pulses per revolution.", example="60", default=1)
-    angle: float = quantity(
+    angle: float | None = quantity(
         "rad",
-        doc="Direction in which the key-phasor looks, from straight up in the sense of spin.",
+        doc="Direction in which the key-phasor looks, from straight up in the sense of spin [default: "
+        "unknown; phases are as at 0, and not compared with those of a simulation].",
         example='"45 deg"',
-        default=0.0,
+        default=None,
     )
     zero: str = choice(
         of=("straight_up", "pulse"),

@@ -14,7 +14,7 @@ import xarray as xr
 from postproc.measured.formats import FORMATS
 from postproc.measured.keys import build_keys, read_keys
 from postproc.measured.record import read_record
-from postproc.signals.places import seen_by_two
+from postproc.signals.places import see_motion, seen_by_two
 from postproc.store.attributes import MEASURED
 from rubhpc.errors import InputError
 from rubhpc.integrate.measuring.orbit_measures import period
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from postproc.measured.keys import MeasuredKeys, Signal
     from postproc.measured.record import Record
 
-_ACROSS = 0.05  # least sine of the angle between two probes that see a motion
 _WINDOW = 6  # revolutions over which orders are followed, as in a simulated run-up
 _PLAIN_ORDERS = 8  # up to which an orbit is compared with itself: above is noise, for the most part
 
@@ -180,12 +179,8 @@ def _with_orbit(found: xr.Dataset, keys: MeasuredKeys, probes: list[dict[str, An
     if "vertical" in found or "horizontal" in found:
         node = next((s.node for s in keys.signals if s.name in ("vertical", "horizontal") and s.node), None)
         return found if node is None else found.assign_attrs(node=node)
-    seen = [probe for probe in probes if probe["quantity"] == "displacement"]
-    for first, second in combinations(seen, 2):
-        is_one_place = all(first.get(key) == second.get(key) for key in ("node", "stator"))
-        if is_one_place and abs(math.sin(second["angle"] - first["angle"])) > _ACROSS:
-            return seen_by_two(found, first, second)
-    return found
+    pair = next((pair for pair in combinations(probes, 2) if see_motion(*pair)), None)
+    return found if pair is None else seen_by_two(found, *pair)
 
 
 def _period(found: xr.Dataset, n: int) -> int:

@@ -84,7 +84,7 @@ def by_key_phasor(values: Floats, step: float, keys: SpeedKeys, where: str) -> T
     pulses, number, notes = _numbered(pulses, where)
     turns = number / keys.per_revolution
     if keys.zero == "straight_up":
-        turns = turns + keys.angle / (2.0 * math.pi)
+        turns = turns + (keys.angle or 0.0) / (2.0 * math.pi)
     if keys.per_revolution > 1:
         notes.append("the angle of the shaft counts from one of several pulses: phases are relative")
     # A logic pulse is placed by its sample alone, within a step: variance step^2 / 12.
@@ -94,7 +94,7 @@ def by_key_phasor(values: Floats, step: float, keys: SpeedKeys, where: str) -> T
         first=float(turns[0]),
         last=float(turns[-1]),
         notes=notes,
-        is_absolute=keys.per_revolution == 1 and keys.zero == "straight_up",
+        is_absolute=keys.per_revolution == 1 and keys.zero == "straight_up" and keys.angle is not None,
     )
 
 

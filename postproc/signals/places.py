@@ -126,6 +126,13 @@ def signal_or_whirl(
     return moved_at(store, probes, node, stator), WHIRL
 
 
+def see_motion(first: dict[str, Any], second: dict[str, Any]) -> bool:
+    """Whether two probes see the displacement of one place in different directions."""
+    is_one_place = all(first.get(key) == second.get(key) for key in ("node", "stator"))
+    is_motion = first["quantity"] == second["quantity"] == "displacement"
+    return is_one_place and is_motion and bool(_sine(first, second))
+
+
 def seen_by_two(store: xr.Dataset, first: dict[str, Any], second: dict[str, Any]) -> xr.Dataset:
     """Return the store with the motion that two probes of different directions see."""
     names = [f"{PROBE}{probe['name']}" for probe in (first, second)]

@@ -14,7 +14,7 @@ from rubhpc.fem.model import MOST_DEGREES, Model, check_computable, computable
 from rubhpc.fem.rotor import assemble_rotor
 from rubhpc.fem.statics import at_rest_under, caught
 from rubhpc.fem.stator import assemble_stator
-from rubhpc.rig.rotors import Load, Unbalance
+from rubhpc.rig.rotors import Harmonic, Load, Unbalance
 from rubhpc.rig.stators import Stator
 
 if TYPE_CHECKING:
@@ -45,6 +45,7 @@ def assemble(rig: Rig) -> Model:
     with computable("[rotor]"):
         body = assemble_rotor(rig.rotor)
         constant, cosine, sine = forces_on(rig.rotor, body)
+        harmonics = harmonics_on(rig.rotor, body)
     check_computable("[rotor]", body)
     if bores := {stator.node for stator in rig.stator if stator.is_bore}:
         body = caught(body, bores)
@@ -70,6 +71,7 @@ def assemble(rig: Rig) -> Model:
         rotor=body,
         unbalance_cosine=cosine,
         unbalance_sine=sine,
+        harmonics=harmonics,
         stators=tuple(stators),
         output_node=rig.rotor.recorded_node([stator.node for stator in rig.stator]),
         sag=sag,
@@ -165,6 +167,24 @@ def _(force: Unbalance) -> Lateral:
 @lateral_force.register(Load)
 def _(force: Load) -> Lateral:
     return Lateral(constant=(force.vertical, force.horizontal))
+
+
+@lateral_force.register(Harmonic)
+def _(force: Harmonic) -> Lateral:
+    """Nothing: its order is its own (`harmonics_on`)."""
+    return Lateral()
+
+
+def harmonics_on(rotor: AnyRotor, body: Body) -> tuple[tuple[int, NDArray[np.complex128]], ...]:
+    """Phasors (n_dof,), N, of the harmonics by order: `F (cos(n spin t + phase), sin(n spin t + phase))`."""
+    found: dict[int, NDArray[np.complex128]] = {}
+    for force in rotor.harmonic:
+        phasor = found.setdefault(force.order, np.zeros(body.n_dof, dtype=np.complex128))
+        for name, turn in (("v", 1.0), ("w", -1j)):
+            row = body.index(rotor.node_of(force), name)
+            if row >= 0:
+                phasor[row] += force.force * turn * np.exp(1j * force.phase)
+    return tuple(sorted(found.items()))
 
 
 def forces_on(rotor: AnyRotor, body: Body) -> tuple[Floats, Floats, Floats]:

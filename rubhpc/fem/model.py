@@ -288,7 +288,8 @@ class ProbeRows:
 class Model:
     """Rotor and stators, assembled.
 
-    The unbalance force on the rotor is `spin^2 (unbalance_cosine cos(spin t) + unbalance_sine sin(spin t))`.
+    The unbalance force on the rotor is `spin^2 (unbalance_cosine cos(spin t) + unbalance_sine sin(spin t))`,
+    that of each (order, phasor) among the harmonics `Re(phasor exp(i order spin t))`.
     """
 
     rotor: Body
@@ -300,6 +301,7 @@ class Model:
     load: NDArray[np.float64]  # (n_dof,), constant loads on the rotor, N or N m
     carriers: tuple[CarrierModel, ...] = ()
     probe: ProbeRows | None = None
+    harmonics: tuple[tuple[int, NDArray[np.complex128]], ...] = ()  # phasors (n_dof,), N
     film: NDArray[np.float64] | None = None  # (n_dof,), N, where tables place journals: K sag = load + film
 
     @cached_property
@@ -347,6 +349,11 @@ class Model:
     def turning_carriers(self) -> tuple[CarrierModel, ...]:
         """Carriers that are not held in rotation about the shaft's axis."""
         return tuple(carrier for carrier in self.carriers if carrier.body.index(1, "thx") >= 0)
+
+    @property
+    def highest_order(self) -> int:
+        """Highest order of a force on the rotor."""
+        return max((order for order, _ in self.harmonics), default=1)
 
     @property
     def n_probe(self) -> int:

@@ -92,11 +92,28 @@ def harmonic_response(
         ) from None
 
 
+def steady_lines(model: Model, spin: float) -> dict[int, NDArray[np.complex128]]:
+    """Return the steady responses of the rotor (n_dof,) by order: to the unbalance, 1, and to harmonics."""
+    lines = {1: steady_response(model, spin)}
+    for order, force in model.harmonics:
+        lines[order] = lines.get(order, 0.0) + harmonic_response(model, spin, order, force)
+    return lines
+
+
+def _orbit(model: Model, spin: float, node: int) -> NDArray[np.float64]:
+    """Steady v and w of a node over a turn of the shaft, (2, n_phase), m."""
+    turn, found = np.exp(2j * np.pi * np.arange(PHASES) / PHASES), np.zeros((2, PHASES))
+    for order, line in steady_lines(model, spin).items():
+        for moved, amplitude in zip(found, model.rotor.at_node(node, line), strict=True):
+            moved += (amplitude * turn**order).real
+    return found
+
+
 def contact_free_amplitude(model: Model, spin: float, node: int | None = None) -> float:
     """Return the largest deflection `sqrt(v^2 + w^2)` of the steady contact-free orbit, m.
 
     The orbit is the sum of a forward circle of radius |F| and a backward circle of radius |B|: an ellipse
-    with the major semi-axis |F| + |B|.
+    with the major semi-axis |F| + |B|. Of harmonics the orbit is followed over a turn.
 
     Parameters
     ----------
@@ -107,6 +124,8 @@ def contact_free_amplitude(model: Model, spin: float, node: int | None = None) -
         Default: the model's output node.
     """
     node = model.output_node if node is None else node
+    if model.harmonics:
+        return float(np.hypot(*_orbit(model, spin, node)).max())
     response = steady_response(model, spin)
     v, w = model.rotor.at_node(node, response)
     return float(abs(v + 1j * w) + abs(v - 1j * w)) / 2
@@ -129,11 +148,12 @@ def contact_free_reach(model: Model, spin: float) -> float:
     nearer, aside = sag_at_stators(model)
     reach = -math.inf
     for stator, sag, off in zip(model.stators, nearer, aside, strict=True):
-        v, w = model.rotor.at_node(stator.node, response)
-        if stator.is_bore:
-            turn = np.exp(2j * np.pi * np.arange(PHASES) / PHASES)
-            away = np.abs((v * turn).real + sag + 1j * ((w * turn).real - off)).max()
+        if stator.is_bore or model.harmonics:
+            v, w = _orbit(model, spin, stator.node)
+            along = v * math.cos(stator.angle) + w * math.sin(stator.angle)
+            away = np.abs(v + sag + 1j * (w - off)).max() if stator.is_bore else along.max() + sag
         else:
+            v, w = model.rotor.at_node(stator.node, response)
             away = abs(v * math.cos(stator.angle) + w * math.sin(stator.angle)) + sag
         reach = max(reach, float(away) - stator.clearance_offset)
     return reach

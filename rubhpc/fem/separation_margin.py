@@ -11,7 +11,7 @@ greatest one, at most 26 percent.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -165,7 +165,8 @@ def amplitude_over_speed(model: Model, node: int, probe: float | None = None) ->
         Angle of a displacement probe, rad; by default the major semi-axis of the orbit.
     """
     if probe is None:
-        return lambda spin: contact_free_amplitude(model, spin, node)
+        unbalanced = replace(model, harmonics=())
+        return lambda spin: contact_free_amplitude(unbalanced, spin, node)
     along, across = math.cos(probe), math.sin(probe)
 
     def amplitude(spin: float) -> float:

@@ -2,7 +2,8 @@
 
 S. Talts and others, arXiv:1804.06788, 2018. Truths are drawn from the priors, records simulated from them by
 another scheme, sensed with noise, read like any file, and identified. The rank of the truth among the draws
-of its posterior is then uniform, and intervals hold it as often as they claim.
+of its posterior is then uniform, and intervals hold it as often as they claim. The posteriors share their
+cases where these can be interpolated (`Interpolated`).
 """
 
 from __future__ import annotations
@@ -10,7 +11,9 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
+from itertools import groupby
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, NamedTuple
@@ -21,10 +24,14 @@ from postproc.measured.measured import measured
 from postproc.signals.sensors import Sensor, sense
 from rubhpc.errors import InputError, writing
 from rubhpc.identification.candidates import settings_of, simulated
+from rubhpc.identification.comparison import log_likelihood
 from rubhpc.identification.evaluation import Shared
+from rubhpc.identification.interpolated import Interpolated
+from rubhpc.identification.lines import LineComparison
 from rubhpc.identification.nested import Alone, require_sampler, sample
 from rubhpc.identification.priors import at_shares
 from rubhpc.identification.problem import read_known, read_problem
+from rubhpc.recent import recent
 from rubhpc.running.ending import ended_together
 from rubhpc.schema import DONE
 from rubhpc.study.axes import SPEED_AXES
@@ -92,7 +99,7 @@ class Ranked(NamedTuple):
     truth: list[float]  # (n_value,)
     ranks: list[int]  # (n_value,), how many of 99 draws are below it
     errors: list[float]  # (n_value,), of the posterior's mean, over the width of the prior
-    n_case: int  # that were computed
+    n_look: int  # likelihoods that were evaluated
 
 
 @on_one_thread
@@ -107,11 +114,18 @@ def calibrate_on(
         shared = Shared(pool)
         require_sampler()
         found: list[Ranked] = []
-        while len(found) < len(trials):
+        by_draw = [list(some) for _, some in groupby(trials, lambda trial: trial.draw)]
+        for at in range(0, len(by_draw), pool.size):
             report(f"{len(found)} of {len(trials)} posteriors")
-            found += shared.map(rank_of, trials[len(found) : len(found) + pool.size])
+            for some in shared.map(ranks_of, by_draw[at : at + pool.size]):
+                found += some
         shared.close()
         return found
+
+
+def ranks_of(trials: Sequence[Trial]) -> list[Ranked]:
+    """Return where the truths of some trials lie."""
+    return [rank_of(trial) for trial in trials]
 
 
 def rank_of(trial: Trial) -> Ranked:
@@ -145,32 +159,45 @@ def _name(trial: Trial, known: Known) -> str:
 
 def _ranked(trial: Trial, known: Known) -> Ranked:
     """Draw a truth, measure it, and identify it."""
-    rng = np.random.default_rng([trial.seed, trial.draw])
-    truth, seen = _measured(trial, known, rng)
+    truth, seen = _measured(trial, known)
     problem = read_problem(seen, trial.study, trust_rig=trial.trust_rig)
     sampled = sample(
-        lambda values: _log_likelihood(problem, values),
-        lambda shares: at_shares(known.priors, shares),
+        _likelihood(problem, known),
+        lambda shares: shares,
         len(known.priors),
         mapper=Alone(),
         live=trial.live,
         seed=trial.draw,
     )
-    draws = sampled.values[sampled.draws(_RANKS, trial.draw)]
+    values = np.array([at_shares(known.priors, shares) for shares in sampled.values])
+    draws = values[sampled.draws(_RANKS, trial.draw)]
     widths = np.array([prior.spread for prior in known.priors])
-    errors = (np.exp(sampled.log_weights) @ sampled.values - truth) / widths
+    errors = (np.exp(sampled.log_weights) @ values - truth) / widths
     return Ranked(truth.tolist(), (draws < truth).sum(axis=0).tolist(), errors.tolist(), sampled.n_call)
 
 
-def _log_likelihood(problem: Problem, values: Floats) -> float:
-    try:
-        return problem.rub.log_likelihood(problem.rub.outcome(values.tolist()))
-    except Exception:  # as in a study, where such a case is marked as failed
-        return -math.inf
+def _likelihood(problem: Problem, known: Known) -> Callable[[Floats], float]:
+    """Logarithm of the likelihood over the unit cube; cases are interpolated where that is as good."""
+    comparison = problem.comparison
+    if isinstance(comparison, LineComparison):
+        of = known.table, problem.channels.n, comparison.orders, problem.machine.study.recording
+        features = recent(lambda: Interpolated(problem.rub), "features", known.rig, *of)
+        if features.serves(comparison.measured):
+            return lambda shares: log_likelihood(comparison, features(shares))
+
+    def by_case(shares: Floats) -> float:
+        try:
+            return problem.rub.log_likelihood(problem.rub.outcome(at_shares(known.priors, shares).tolist()))
+        except Exception:  # as in a study, where such a case is marked as failed
+            return -math.inf
+
+    return by_case
 
 
-def _measured(trial: Trial, known: Known, rng: np.random.Generator) -> tuple[Floats, xr.Dataset]:
-    """A truth that can be computed, and its record as a file of a data logger gives it."""
+@lru_cache(maxsize=1)
+def _truth(trial: Trial) -> tuple[Floats, xr.Dataset]:
+    """A truth that can be computed, and its signals; the noise of the trial does not matter."""
+    known = read_known(trial.study, trust_rig=trial.trust_rig)
     if not set(SPEED_AXES) & set(known.at_medians):
         raise InputError(f"{trial.study}: [grid]: a calibration needs a speed; add speed or speed_ratio")
     record = {
@@ -182,18 +209,23 @@ def _measured(trial: Trial, known: Known, rng: np.random.Generator) -> tuple[Flo
     table = known.table | {"grid": known.at_medians, "record": record}
     study = study_of(table, Path(trial.study), trust_rig=trial.trust_rig)
     integrator = known.tables["integrator"] | {"method": trial.method}
+    rng = np.random.default_rng([trial.seed, trial.draw])
     for _ in range(_TRIES):
         truth = at_shares(known.priors, rng.random(len(known.priors)))
         settings = settings_of(study, known.priors, truth.tolist())
         found = simulated(study, known.tables | {"integrator": integrator}, settings, _SAMPLES)
         if found.status == DONE:
-            break
-    else:
-        raise InputError(f"{trial.study}: no case of the prior can be computed; narrow the priors")
-    signals = found.to_dataset()
+            return truth, found.to_dataset()
+    raise InputError(f"{trial.study}: no case of the prior can be computed; narrow the priors")
+
+
+def _measured(trial: Trial, known: Known) -> tuple[Floats, xr.Dataset]:
+    """A truth, and its record as a file of a data logger gives it."""
+    truth, signals = _truth(replace(trial, noise=0.0))
     sensors = {name: Sensor(white=trial.noise * float(signals[name].std() or 1.0)) for name in trial.signals}
     rate = _RATE * float(signals["spin_speed"]) / (2.0 * math.pi)
-    sensed = sense(signals, sensors, rate=rate, seed=int(rng.integers(2**31)))
+    seed = int(np.random.default_rng([trial.seed, trial.draw, 1]).integers(2**31))
+    sensed = sense(signals, sensors, rate=rate, seed=seed)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "record.csv"
         names = ["time", *trial.signals, "key_phasor"]
@@ -202,7 +234,7 @@ def _measured(trial: Trial, known: Known, rng: np.random.Generator) -> tuple[Flo
         return truth, measured(
             path,
             time={"column": "time"},
-            speed={"column": "key_phasor", "level": 2.5},
+            speed={"column": "key_phasor", "level": 2.5, "angle": 0.0},
             signals={name: {"unit": str(signals[name].attrs["units"])} for name in trial.signals},
         )
 
@@ -213,16 +245,16 @@ def in_table(trials: Sequence[Trial], found: Sequence[Ranked]) -> Iterator[str]:
 
     priors = read_known(trials[0].study, trust_rig=trials[0].trust_rig).priors
     heads = ["noise", "posteriors", "quantity", *(f"in {100 * share:g} %" for share in COVERED)]
-    heads += ["uniform ranks, p", "error", "cases each"]
+    heads += ["uniform ranks, p", "error", "likelihoods each"]
     yield f"| {' | '.join(heads)} |"
     yield "|" + " --- |" * len(heads)
     for noise in dict.fromkeys(trial.noise for trial in trials):
         some = [one for trial, one in zip(trials, found, strict=True) if trial.noise == noise]
-        n_case = float(np.mean([one.n_case for one in some]))
+        n_look = float(np.mean([one.n_look for one in some]))
         for i, prior in enumerate(priors):
             shares = np.array([(one.ranks[i] + 0.5) / (_RANKS + 1) for one in some])
             inside = [float(np.mean(np.abs(shares - 0.5) <= 0.5 * share)) for share in COVERED]
             error = float(np.sqrt(np.mean([one.errors[i] ** 2 for one in some])))
             cells = [f"{noise:g}", str(len(some)), prior.name, *(f"{100 * one:.0f} %" for one in inside)]
-            cells += [f"{kstest(shares, 'uniform').pvalue:.2g}", f"{error:.2g}", f"{n_case:.0f}"]
+            cells += [f"{kstest(shares, 'uniform').pvalue:.2g}", f"{error:.2g}", f"{n_look:.0f}"]
             yield f"| {' | '.join(cells)} |"

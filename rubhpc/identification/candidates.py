@@ -1,9 +1,9 @@
 """What may be behind a measurement: machines with rub, without it, and with misalignment.
 
-Without contact a machine is linear, and its steady motion is that of the unbalance. Misalignment adds what a
-coupling at the first node of the shaft does at twice the speed: a force that rotates forward, one that
-rotates backward and, where torsion is measured, a torque, of any size and phase. Since the machine is linear
-these are integrated over in closed form.
+Without contact a machine is linear, and its steady motion is that of unbalance and harmonics. Misalignment
+adds what a coupling at the first node of the shaft does at twice the speed: a force that rotates forward, one
+that rotates backward and, where torsion is measured, a torque, of any size and phase. Since the machine is
+linear these are integrated over in closed form.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 from rubhpc.case_arguments import case_of
 from rubhpc.fem.assemble import assemble, model_at
 from rubhpc.fem.probes import with_probes
-from rubhpc.fem.response import first_lateral_frequency, harmonic_response, response_nodes, steady_response
+from rubhpc.fem.response import first_lateral_frequency, harmonic_response, response_nodes, steady_lines
 from rubhpc.identification.comparison import Unknown, log_likelihood
 from rubhpc.integrate.case import run_case
 from rubhpc.recent import recent
@@ -176,7 +176,7 @@ class Machine:
                 found[i] = amplitude[row] * (rates[2] if name == "torsion_acceleration" else 1.0)
         return found  # stators, which nothing moves, have 0
 
-    def waves(self, model: Model, spin: float, lines: Mapping[float, Lines]) -> Floats:
+    def waves(self, model: Model, spin: float, lines: Mapping[int, Lines]) -> Floats:
         """Return what the channels see of lines (n_dof,) of the rotor by order, (n_channel, n_sample)."""
         angle = 2.0 * math.pi * np.arange(_TURNS * self.channels.n) / self.channels.n
         seen = [
@@ -264,7 +264,7 @@ class NoRub:
     def waves(self, values: Sequence[float]) -> Floats:
         """Return what the channels see, (n_channel, n_sample)."""
         model, spin = self.model(values)
-        return self.machine.waves(model, spin, {1.0: steady_response(model, spin)})
+        return self.machine.waves(model, spin, steady_lines(model, spin))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from postproc.signals.places import see_motion
 from postproc.signals.resampling import between
 from postproc.signals.spectra import samples_per_revolution
 from postproc.store.attributes import MEASURED
@@ -26,6 +29,9 @@ _BAND = 0.4  # of the sampling rate: beyond, the filter of the logger has taken 
 _FEWEST = 24  # revolutions
 _MOVED = "measured_"  # what probes at the node of a measured orbit are called
 _ANGLES = {"vertical": 0.0, "horizontal": 0.5 * math.pi}
+_POINTING = math.radians(1.0)  # by which the direction of a key-phasor is known
+_PLACED = 0.3  # of a sample, by which its pulses are placed (standard deviation)
+_DEAD = 1e-9  # of the largest value: a signal that varies by less is constant
 _SLIP = 0.02  # by which a speed that is given may be wrong
 _HARMONICS = 4  # by which the true speed is found
 _TRIALS = 20  # a bin of the spectrum
@@ -52,8 +58,9 @@ class Channels:
         rad/s.
     highest_order : float
         Up to which the data logger can see.
-    is_absolute : bool
-        Whether the angle of the shaft, and with it every phase, is that of a simulation.
+    angle_error : float
+        rad, standard deviation of the angle of the shaft, by which phases are those of a simulation; infinite
+        where it is unknown.
     """
 
     names: tuple[str, ...]
@@ -65,18 +72,25 @@ class Channels:
     n: int
     spin: float
     highest_order: float
-    is_absolute: bool
+    angle_error: float
 
     @property
     def revolutions(self) -> int:
         """Of the record."""
         return int(self.waves.shape[1]) // self.n
 
-    @property
-    def orbit(self) -> tuple[int, int] | None:
-        """Positions of the vertical and the horizontal motion, where both were measured."""
-        if {"vertical", "horizontal"} <= set(self.names):
-            return self.names.index("vertical"), self.names.index("horizontal")
+    @cached_property
+    def orbit(self) -> Floats | None:
+        """Shares (2, n_channel) of signals in the vertical and horizontal motion that two of them see."""
+        own = {name: {"angle": angle, "quantity": "displacement"} for name, angle in _ANGLES.items()}
+        known = own | {PROBE + probe["name"]: probe for probe in self.probes}
+        looks = [(i, known[name]) for i, name in enumerate(self.simulated) if name in known]
+        for (i, one), (j, other) in combinations(looks, 2):
+            if see_motion(one, other):
+                seen = [[math.cos(probe["angle"]), math.sin(probe["angle"])] for probe in (one, other)]
+                shares = np.zeros((2, len(self.names)))
+                shares[:, [i, j]] = np.linalg.inv(seen)
+                return shares
         return None
 
     def of_record(self, signals: Mapping[str, Floats]) -> Floats:
@@ -88,7 +102,7 @@ def channels_of(measured: xr.Dataset) -> Channels:
     """Return the channels of a measured dataset.
 
     Signals with the name of a stored one are that; those of a stator are of the first. Of two probes whose
-    orbit is derived the probes themselves are used.
+    orbit is derived the probes themselves are used. Signals that are constant are left out.
 
     Raises
     ------
@@ -104,9 +118,11 @@ def channels_of(measured: xr.Dataset) -> Channels:
     known = {PROBE + probe["name"]: probe for probe in measured.attrs["study"]["record"]["probe"]}
     derived = set(_ANGLES) if "probes" in measured.attrs else set()
     names, simulated, probes = [], [], []
-    for name in (str(key) for key, values in measured.data_vars.items() if values.dims == ("sample",)):
+    for name in (str(key) for key, of in measured.data_vars.items() if of.dims == ("sample",)):
         if name in derived or not is_signal(name):
             continue
+        if np.ptp(values := measured[name].values) <= _DEAD * np.abs(values).max():
+            continue  # a dead sensor
         probe = known.get(name)
         if probe is not None and not {"node", "stator"} & set(probe):
             fix = f"add node = 8 to [signal.{probe['name']}], or stator = 1"
@@ -117,18 +133,22 @@ def channels_of(measured: xr.Dataset) -> Channels:
         names.append(name)
         simulated.append(name if probe is None else PROBE + probe["name"])
         probes += [] if probe is None else [probe]
+    if not names:
+        raise InputError(f"{where}: all signals are constant; choose other columns")
     n = samples_per_revolution(measured["revolution"])
     revolutions = measured.sizes["sample"] // n
     if revolutions < _FEWEST:
         problem = f"has {revolutions} revolutions, fewer than {_FEWEST}"
         raise InputError(f"{where}: {problem}; give a longer record")
     spin = float(measured["spin_speed"])
-    is_absolute = bool(measured.attrs.get("has_absolute_phase", 0))
+    rate = float(measured.attrs.get("rate", math.inf))
     waves = np.stack([measured[name].values.astype(float) for name in names])
-    if not is_absolute:  # the speed may be a nominal one
+    if measured.attrs.get("has_absolute_phase", 0):
+        angle_error = math.hypot(_POINTING, _PLACED * spin / rate)
+    else:  # the speed may be a nominal one
         slip = _slip(waves, n)
-        spin, waves = spin * slip, _turned_by(waves, n, slip)
-    seen = _BAND * min(float(measured.attrs.get("rate", math.inf)) * 2.0 * math.pi / spin, n)
+        spin, waves, angle_error = spin * slip, _turned_by(waves, n, slip), math.inf
+    seen = _BAND * min(rate * 2.0 * math.pi / spin, n)
     return Channels(
         names=tuple(names),
         simulated=tuple(simulated),
@@ -139,7 +159,7 @@ def channels_of(measured: xr.Dataset) -> Channels:
         n=n,
         spin=spin,
         highest_order=seen,
-        is_absolute=is_absolute,
+        angle_error=angle_error,
     )
 
 

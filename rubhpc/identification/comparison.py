@@ -18,13 +18,14 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 # Relative errors of the model's lines that are thought possible, equally likely; what they are is learnt too.
-DISCREPANCIES = np.geomspace(1e-3, 0.3, 7)
-ACCURACY = 1e-3  # of a simulated signal, of its rms: no line is compared more closely
+DISCREPANCIES = np.geomspace(3e-5, 0.3, 9)
+LEAST = 0.03  # of the rms of its signal: even a smaller line has the error of one of that size
 WHOLE = 8.0  # order up to which every line is compared
 NEAR = 0.2  # of a natural frequency, within which lines above that are compared too
 _PERIODS = (6, 12, 10, 14, 8, 16, 18, 22, 26)  # revolutions that hold whole periods; 6 of 1, 2 and 3
 _FEWEST = 4  # of them in a record
 _BROAD = 0.05  # share of the power between the lines from which on a motion does not repeat
+_LEFT = 0.1  # of that share of the first period, which a longer one may leave
 
 
 class Seen(NamedTuple):
@@ -97,22 +98,31 @@ def period_of_lines(channels: Channels) -> int:
     """Return in how many revolutions the measured motion repeats a whole number of times; 0: in none.
 
     White noise does not count, nor does what one channel alone shows, such as a torsional encoder of a shaft
-    without torsional vibration.
+    without torsional vibration. A longer period than the first has to explain what that one leaves: a
+    quasi-periodic motion nearly repeats after some of many numbers of revolutions.
     """
+    first = _between(channels, _PERIODS[0])
+    steadiest = int(first.argmin())
     for period in _PERIODS:
-        whole = channels.revolutions // period * period
         if channels.revolutions < _FEWEST * period:
             continue
-        power = np.abs(lines_of(channels.waves, channels.n, whole)) ** 2
-        first, last = (math.floor(share * channels.highest_order * whole) for share in (0.75, 1.0))
-        white = np.median(power[:, first:last], axis=1) / math.log(2.0)  # of exponential variates: the mean
-        low = power[:, 1 : math.ceil(WHOLE * whole)]
-        is_between = np.ones(low.shape[1], dtype=bool)
-        is_between[whole // period - 1 :: whole // period] = False
-        excess = low[:, is_between].sum(axis=1) - white * is_between.sum()
-        if float((excess / np.maximum(low.sum(axis=1), np.finfo(float).tiny)).min()) < _BROAD:
+        most = _BROAD if period == _PERIODS[0] else min(_BROAD, _LEFT * first[steadiest])
+        if _between(channels, period)[steadiest] < most:
             return period
     return 0
+
+
+def _between(channels: Channels, period: int) -> Floats:
+    """Return the share of the power (n_channel,) that lies between the lines of a period."""
+    whole = channels.revolutions // period * period
+    power = np.abs(lines_of(channels.waves, channels.n, whole)) ** 2
+    first, last = (math.floor(share * channels.highest_order * whole) for share in (0.75, 1.0))
+    white = np.median(power[:, first:last], axis=1) / math.log(2.0)  # of exponential variates: the mean
+    low = power[:, 1 : math.ceil(WHOLE * whole)]
+    is_between = np.ones(low.shape[1], dtype=bool)
+    is_between[whole // period - 1 :: whole // period] = False
+    excess = low[:, is_between].sum(axis=1) - white * is_between.sum()
+    return np.asarray(excess / np.maximum(low.sum(axis=1), np.finfo(float).tiny))
 
 
 def lines_of(waves: Floats, n: int, revolutions: int) -> NDArray[np.complex128]:

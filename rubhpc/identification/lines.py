@@ -2,18 +2,19 @@
 
 A measured line is `d = m exp(i k theta) + noise`, with m that of the model, k its order, and theta by how far
 the model's revolution has to be turned. Where the angle of the shaft is known theta is a number of whole
-revolutions, which is unknown as long as the motion repeats every few of them; else it is any angle. It is
-integrated over. The errors of real and imaginary part are Gaussian and independent of line and channel, with
-the variance
+revolutions, which is unknown as long as the motion repeats every few of them, within the error of that angle;
+else it is any angle. It is integrated over. The errors of real and imaginary part are Gaussian and
+independent of line and channel, with the variance
 
-    |noise|^2 + |scatter|^2 + (discrepancy |m|)^2 + (accuracy rms)^2
+    |noise|^2 + |scatter|^2 + discrepancy^2 (|m|^2 + (0.03 rms)^2)
 
-where the noise is that of the measured lines between those of the orders compared, within half an order, and
-the scatter the same of the simulation: it is 0 of a motion that repeats.
+with the rms of the signal. The noise is that of the measured lines between those of the orders compared,
+within half an order, and the scatter the same of the simulation: it is 0 of a motion that repeats.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import TYPE_CHECKING
 
@@ -21,8 +22,8 @@ import numpy as np
 from scipy.special import logsumexp
 
 from rubhpc.identification.comparison import (
-    ACCURACY,
     DISCREPANCIES,
+    LEAST,
     Seen,
     likeliest,
     lines_of,
@@ -44,6 +45,7 @@ _NEIGHBOURS = 0.5  # orders to either side, whose lines give the noise
 _FINE = 12  # trial angles a turn of the highest order
 _DEEP = 25.0  # by how much less likely an angle is that is left out
 _NEWTON = 4
+_FLAT = 1e-9  # of the largest bend: a smaller one counts as this
 
 
 class LineComparison:
@@ -59,20 +61,24 @@ class LineComparison:
     """
 
     def __init__(self, channels: Channels, period: int, natural: Sequence[float]) -> None:
-        self._n, self._period, self._is_absolute = channels.n, period, channels.is_absolute
+        self._n, self._period, self._angle_error = channels.n, period, channels.angle_error
         orders = np.arange(1, math.floor(channels.highest_order * period) + 1) / period
         self._kept = np.flatnonzero(wanted_orders(orders, natural, channels.highest_order)) + 1
         self.orders = self._kept / period
         self.measured = self._seen(channels.waves)
         size = np.std(channels.waves, axis=1)
-        self._floor = (ACCURACY * size[:, None]) ** 2
+        self._least = (LEAST * size[:, None]) ** 2
         self.about = (
             f"it repeats: {self.orders.size} lines of each signal are compared by amplitude and phase, up to "
             f"{self.orders[-1]:.3g}X in steps of 1/{period}X"
         )
-        n_angle = period if self._is_absolute else period * math.ceil(_FINE * self.orders[-1])
+        n_angle = period * (1 if self._is_absolute else math.ceil(_FINE * self.orders[-1]))
         self._angles = 2.0 * math.pi * period / n_angle * np.arange(n_angle)
         self._turned = np.exp(1j * np.outer(self.orders, self._angles))
+
+    @property
+    def _is_absolute(self) -> bool:
+        return math.isfinite(self._angle_error)
 
     def _seen(self, waves: Floats) -> Seen:
         """Lines at the orders compared, and the mean power of those between them."""
@@ -102,10 +108,8 @@ class LineComparison:
             apart = apart + 0.0
             apart[:, 0, at] = -_over_forces(self.measured.values[:, at], variance[0, :, at], unknown)
         gain = 2.0 * np.real(product @ self._turned)
-        if self._is_absolute:
-            turned = logsumexp(gain, axis=1) - math.log(self._period)
-        else:
-            turned = np.array([self._over_angles(*pair) for pair in zip(product, gain, strict=True)])
+        peaks = itertools.starmap(self._peaks, zip(product, gain, strict=True))
+        turned = np.array([logsumexp(top, b=share) for top, share in peaks])
         return np.asarray(turned - apart.sum(axis=(1, 2)))
 
     def _apart(
@@ -116,8 +120,8 @@ class LineComparison:
         The lines of unknown forces have no part in them.
         """
         lines, model = self.measured.values, seen.values
-        error = (discrepancies[:, None, None] * np.abs(model)) ** 2
-        variance = self.measured.variance + seen.variance + self._floor + error
+        error = discrepancies[:, None, None] ** 2 * (np.abs(model) ** 2 + self._least)
+        variance = self.measured.variance + seen.variance + error
         apart = (np.abs(lines) ** 2 + np.abs(model) ** 2) / variance + np.log(np.pi * variance)
         products = np.conj(lines) * model / variance
         if unknown is not None and (at := self._at(unknown)) is not None:
@@ -136,30 +140,39 @@ class LineComparison:
         logs = np.log(np.pi * variance)
         if unknown is not None and (at := self._at(unknown)) is not None:
             logs[:, :, at] = 0.0
-        gain = 2.0 * np.real(product @ self._turned).max()
-        return float(((apart - logs).sum() - gain) / apart.size)
+        gain = 2.0 * np.real(product @ self._turned)
+        best, _ = self._peaks(product[0], gain[0])
+        return float(((apart - logs).sum() - best.max()) / apart.size)
 
     def amplitudes(self, seen: Seen) -> tuple[Floats, Floats]:
         """Return the amplitudes of the lines and of their noise, (n_channel, n_line)."""
         return np.abs(seen.values), np.sqrt(seen.variance)
 
-    def _over_angles(self, product: Lines, gain: Floats) -> float:
-        """Integral over the angle by Laplace's method at each maximum, logarithmic."""
-        whole = 2.0 * math.pi * self._period
-        at = np.flatnonzero(
-            (gain >= np.roll(gain, 1)) & (gain > np.roll(gain, -1)) & (gain > gain.max() - _DEEP)
-        )
-        angles = self._angles[at]
-        step = self._angles[1]
+    def _peaks(self, product: Lines, gain: Floats) -> tuple[Floats, Floats]:
+        """Maxima over the angle, and the share of all angles that each stands for (Laplace's method)."""
+        steepest = float(self.orders**2 @ np.abs(product))
+        flat = -max(_FLAT * steepest, np.finfo(float).tiny)
+        if self._is_absolute:
+            reach, stiff = self._angle_error, self._angle_error**-2
+            whole = math.sqrt(2.0 * math.pi) * self._angle_error * self._period
+            first = self._angles
+        else:
+            reach, stiff, whole = 0.5 * self._angles[1], 0.0, 2.0 * math.pi * self._period
+            higher = steepest * reach**2  # at most, between the trial angles
+            is_top = (gain >= np.roll(gain, 1)) & (gain > np.roll(gain, -1))
+            first = self._angles[is_top & (gain > gain.max() - _DEEP - higher)]
+            if not first.size:  # a model that does not move
+                return gain[:1], np.ones(1)
+        angles = first
         for _ in range(_NEWTON):
             turned = product[:, None] * np.exp(1j * np.outer(self.orders, angles))
-            slope = -2.0 * np.imag(self.orders @ turned)
-            bend = np.minimum(-2.0 * np.real(self.orders**2 @ turned), -np.finfo(float).tiny)
-            angles = angles - np.clip(slope / bend, -0.5 * step, 0.5 * step)
+            slope = -2.0 * np.imag(self.orders @ turned) - stiff * (angles - first)
+            bend = np.minimum(-2.0 * np.real(self.orders**2 @ turned) - stiff, flat)
+            angles = angles - np.clip(slope / bend, -reach, reach)
         turned = product[:, None] * np.exp(1j * np.outer(self.orders, angles))
-        bend = np.maximum(2.0 * np.real(self.orders**2 @ turned), 2.0 * math.pi / whole**2)
-        widths = np.sqrt(2.0 * math.pi / bend)
-        return float(logsumexp(2.0 * np.real(turned.sum(axis=0)), b=widths / whole))
+        bend = np.maximum(2.0 * np.real(self.orders**2 @ turned) + stiff, 2.0 * math.pi / whole**2)
+        top = 2.0 * np.real(turned.sum(axis=0)) - 0.5 * stiff * (angles - first) ** 2
+        return top, np.sqrt(2.0 * math.pi / bend) / whole
 
 
 def _over_forces(lines: Lines, variance: Floats, unknown: Unknown) -> float:

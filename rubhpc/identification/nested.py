@@ -24,7 +24,9 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 _QUEUE = 8
+_SPARSE = 30.0  # per cent of the points that are accepted, below which they are drawn within bounds
 _PRECISION = 0.1  # of ln(evidence) that is left when the sampling ends
+_MOST = 1000  # evaluations a live point: a rough likelihood, as of a chaotic machine, has no end of peaks
 
 
 class Sampled(NamedTuple):
@@ -37,6 +39,7 @@ class Sampled(NamedTuple):
     log_evidence: float
     error: float  # standard error of the logarithm
     n_call: int
+    is_whole: bool = True  # it ended by itself
 
     def draws(self, count: int, seed: int) -> NDArray[np.intp]:
         """Return the positions of so many equally likely draws."""
@@ -125,10 +128,11 @@ def sample(
                 rstate=np.random.default_rng(seed),
                 pool=mapper,
                 queue_size=_QUEUE,
+                first_update={"min_eff": _SPARSE},
             )
         except RuntimeError:
             raise InputError("identify: no case of the prior can be computed; narrow the priors") from None
-        sampler.run_nested(dlogz=_PRECISION, print_progress=True, print_func=report)
+        sampler.run_nested(dlogz=_PRECISION, maxcall=_MOST * live, print_progress=True, print_func=report)
     found = sampler.results
     before = np.concatenate([[0.0], found.logvol[:-1]])
     volumes = np.exp(before) - np.exp(found.logvol)
@@ -140,5 +144,6 @@ def sample(
         log_likelihoods=found.logl,
         log_evidence=float(found.logz[-1]),
         error=float(found.logzerr[-1]) if math.isfinite(found.logzerr[-1]) else 0.0,
-        n_call=int(np.sum(found.ncall)),
+        n_call=(n_call := int(np.sum(found.ncall))),
+        is_whole=n_call <= _MOST * live,
     )

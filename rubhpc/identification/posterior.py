@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from rubhpc.identification.comparison import discrepancy_of
+from rubhpc.identification.powers import PowerComparison
 from rubhpc.version import __version__
 
 if TYPE_CHECKING:
@@ -151,19 +152,25 @@ def _named(priors: Sequence[Prior], values: Floats) -> xr.Dataset:
 
 
 def _observed(problem: Problem) -> xr.Dataset:
-    """The measured spectra at the orders compared with their noise, and the mean of some revolutions."""
+    """The measured spectra at the orders compared with their noise, and some revolutions.
+
+    Of a motion that repeats these are the mean over the record.
+    """
     comparison, channels = problem.comparison, problem.channels
     amplitude, noise = comparison.amplitudes(comparison.measured)
     found: dict[str, Any] = {}
     whole = channels.revolutions // _SHOWN
     waves = channels.waves[:, : whole * _SHOWN * channels.n]
-    mean = waves.reshape(len(channels.names), whole, -1).mean(axis=1)
-    mean -= mean.mean(axis=1, keepdims=True)
+    parts = waves.reshape(len(channels.names), whole, -1)
+    shown = parts[:, -1] if isinstance(comparison, PowerComparison) else parts.mean(axis=1)
+    shown = shown - shown.mean(axis=1, keepdims=True)
     for i, name in enumerate(channels.names):
         about = {"units": channels.units[i], "long_name": channels.long_names[i]}
         found[f"spectrum_{name}"] = "order", amplitude[i], about
         found[f"noise_{name}"] = "order", noise[i], about
-        found[name] = "sample", mean[i], about
+        found[name] = "sample", shown[i], about
+    if channels.orbit is not None:
+        found["orbit"] = ("direction", "sample"), channels.orbit @ shown, {"units": "m"}
     return xr.Dataset(found, {"order": comparison.orders})
 
 
@@ -182,4 +189,8 @@ def _predicted(found: Found, at: NDArray[np.intp]) -> xr.Dataset:
         data[f"spectrum_{name}"] = (*dims, "order"), np.stack(spectra)[None, :, i], about
         kept = np.stack([wave[i, : _SHOWN * channels.n] for wave in waves])
         data[name] = (*dims, "sample"), kept[None] - kept.mean(axis=1)[None, :, None], about
+    if channels.orbit is not None:
+        moved = np.stack([channels.orbit @ wave[:, : _SHOWN * channels.n] for wave in waves])
+        moved -= moved.mean(axis=2, keepdims=True)
+        data["orbit"] = ("chain", "draw", "direction", "sample"), moved[None], {"units": "m"}
     return xr.Dataset(data, _counted(picked.size) | {"order": problem.comparison.orders})

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.identification.comparison import ACCURACY, DISCREPANCIES, NEAR, WHOLE, Seen, likeliest
+from rubhpc.identification.comparison import DISCREPANCIES, NEAR, WHOLE, Seen, likeliest
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 _SEGMENT = 4  # revolutions
 _HALF = 0.5  # order, width of a band
+_ACCURACY = 1e-3  # of a simulated signal, of its rms: weaker bands are not compared
 
 
 class PowerComparison:
@@ -51,7 +52,7 @@ class PowerComparison:
         power = self._powers(channels.waves)
         top = (places > 0.75 * channels.highest_order) & (places <= channels.highest_order)
         whole = power.mean(axis=1).sum(axis=1)
-        white = np.median(power.mean(axis=1)[:, top], axis=1) + ACCURACY**2 * whole / places.size
+        white = np.median(power.mean(axis=1)[:, top], axis=1) + _ACCURACY**2 * whole / places.size
         self._white = white[:, None] * self._in_band.sum(axis=1)
         self.measured = self._seen(channels.waves, 0.0)
         self.about = (
@@ -64,9 +65,9 @@ class PowerComparison:
         rows = list(waves.astype(np.complex128))
         size = _SEGMENT * self._n
         if self._orbit is not None:
-            v, w = self._orbit
-            whirl = waves[v] + 1j * waves[w]
-            rows[v], rows[w] = whirl, np.conj(whirl)
+            whirl = np.array([1.0, 1j]) @ self._orbit @ waves
+            for i, row in zip(np.flatnonzero(self._orbit.any(axis=0)), (whirl, np.conj(whirl)), strict=True):
+                rows[i] = row
         starts = range(0, waves.shape[1] - size + 1, size // 2)
         pieces = np.stack([np.stack([row[start : start + size] for start in starts]) for row in rows])
         pieces = pieces - pieces.mean(axis=2, keepdims=True)
@@ -92,7 +93,7 @@ class PowerComparison:
     def _apart(self, seen: Seen, discrepancies: Floats, unknown: Unknown | None) -> tuple[Floats, Floats]:
         """Variance and residuals, (n_discrepancy, n_row, n_band)."""
         error = (2.0 * discrepancies[:, None, None]) ** 2
-        variance = self.measured.variance + seen.variance + ACCURACY**2 + error
+        variance = self.measured.variance + seen.variance + error
         apart = np.abs(self.measured.values - seen.values)
         if unknown is not None:
             apart = np.where(self._in_band[:, round(unknown.order * _SEGMENT)] > 0.0, 0.0, apart)

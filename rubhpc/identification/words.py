@@ -28,6 +28,7 @@ _OPEN = 0.8  # of the spread of a prior, from which on a posterior says nothing
 _TIED = 0.9  # rank correlation of two quantities that are known together only
 _BAD = 4.0  # mean square of residuals over their standard deviation that no model should have
 _INTERVAL = (0.025, 0.5, 0.975)
+_NONE = "no rub"  # name of the hypothesis
 _BEFORE = ", if both were equally likely before"
 
 
@@ -40,10 +41,15 @@ def in_words(found: Found, tree: xr.DataTree) -> Iterator[str]:
         f"measured: {signals}; {channels.revolutions} revolutions at "
         f"{typed_quantity(channels.spin, 'rad s-1')}; {problem.comparison.about}"
     )
+    yield from problem.note.splitlines()
     evidence = found.evidence
     yield "ln(evidence): " + ", ".join(
         f"{name} {value:.1f} +- {error:.1f}" for name, (value, error) in evidence.items()
     )
+    for one, sampled in ((problem.rub, found.rub), *found.others.items()):
+        if not sampled.is_whole:
+            fix = "it may explain more than was found; narrow the priors"
+            yield f"{one.name}: the sampling was ended after {sampled.n_call} cases; {fix}"
     best = max(evidence, key=lambda name: evidence[name][0])
     if problem.rub.name not in evidence:
         yield "no case of [grid] touches, so that a rub has not been tried; lower the clearance"
@@ -78,7 +84,8 @@ def _verdict(evidence: dict[str, tuple[float, float]], rub: str) -> Iterator[str
         yield f"it is {sure}not a rub: {odds} against one{_BEFORE}"
     _, odds, sure = _odds(evidence, others[0], others[1])
     if odds:
-        yield f"it is {sure}{others[0]}: {odds} against {others[1]}"
+        what = "no other fault" if others[0] == _NONE else others[0]
+        yield f"it is {sure}{what}: {odds} against {others[1]}"
     else:
         yield f"the data do not distinguish {others[0]} from {others[1]}"
 

@@ -169,8 +169,17 @@ class ModalSetup:
         for k in np.flatnonzero(exponent.imag == 0.0):  # real but for a factor
             factor = motion[np.abs(motion[:, k]).argmax(), k]
             motion[:, k], enter[k] = (motion[:, k] / factor).real, (enter[k] * factor).real
+        orders, forced = [1], [mode.motion[:, m]]
+        reduced, basis = self.reduced, self.reduced.basis[: self.model.rotor.n_dof]
+        for order, force in self.model.harmonics:
+            rate = 1j * order * self.spin
+            dynamic = reduced.stiffness + rate * reduced.damping + rate**2 * np.eye(len(reduced.stiffness))
+            moved = np.linalg.solve(dynamic, force @ basis)
+            orders.append(order)
+            forced.append(np.concatenate([moved, rate * moved]))
+        is_complex, turning = exponent.imag != 0.0, 1j * self.spin
         return FlightModes(
-            self, exponent, motion, enter, exponent.imag != 0.0, 1j * self.spin, mode.motion[:, m]
+            self, exponent, motion, enter, is_complex, turning, np.array(orders), np.column_stack(forced)
         )
 
     @cached_property
@@ -221,6 +230,13 @@ class ModalSetup:
     def n_solved(self, friction: float) -> int:
         """Number of contact modes of a friction that were solved, including repeated ones."""
         return self._libraries[friction].n_solved if friction in self._libraries else 0
+
+    def forget_but(self, most: int) -> None:
+        """Free the contact modes of all but so many frictions, the last ones."""
+        for friction in list(self._bodies | self._libraries)[:-most]:
+            self.forget(friction)
+        if self.release is not None:
+            self.release.setup.forget_but(most)
 
     def forget(self, friction: float) -> None:
         """Free the contact modes of a friction."""

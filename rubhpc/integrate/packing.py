@@ -44,7 +44,8 @@ class Packed:
     mass: Floats
     damping: Floats
     stiffness: Floats
-    force: Floats  # (2, n_dof), cosine and sine part of the unbalance force, N
+    orders: Ints  # (f,), of the forces that turn with the shaft
+    force: NDArray[np.complex128]  # (f, n_dof), their phasors, N
     degree_row: Ints  # (q, 5), rows of each pair's degrees
     recorded_row: Ints  # (q or more, 5), the same, then each carrier's motion as axial and lateral
     degree_block: Ints  # (q, 5)
@@ -79,7 +80,12 @@ def pack(model: Model, spin: float, step: float) -> Packed:
     block[seen] = np.arange(seen.size)
 
     pick = np.ix_(order, order)
-    mass, stiffness, damping, force = mass[pick], stiffness[pick], damping[pick], force[:, order]
+    mass, stiffness, damping = mass[pick], stiffness[pick], damping[pick]
+    phasors = np.zeros((1 + len(model.harmonics), row.size), dtype=np.complex128)
+    phasors[0] = force[0] - 1j * force[1]
+    for phasor, (_, harmonic) in zip(phasors[1:], model.harmonics, strict=True):
+        phasor[: harmonic.size] = harmonic
+    orders, phasors = np.array([1, *(one for one, _ in model.harmonics)]), phasors[:, order]
     inverse = _inverses(mass + 0.5 * step * damping, start)
     degree_row = np.where(degree >= 0, row[degree], -1)
     at = carrier_degrees(model)
@@ -87,12 +93,13 @@ def pack(model: Model, spin: float, step: float) -> Packed:
     carriers[:, [AXIAL, LATERAL]] = np.where(at >= 0, row[at], -1)
     degree_block = np.where(degree >= 0, block[component[degree]], -1)
     return Packed(
-        linear=_linear(inverse, stiffness, damping, force, start),
+        linear=_linear(inverse, stiffness, damping, orders, phasors, start),
         row=row,
         mass=mass,
         damping=damping,
         stiffness=stiffness,
-        force=force,
+        orders=orders,
+        force=phasors,
         degree_row=degree_row,
         recorded_row=np.concatenate([degree_row, carriers]),
         degree_block=degree_block,
@@ -255,14 +262,21 @@ def _diagonals(matrix: Floats) -> tuple[Floats, Ints]:
     return values, span
 
 
-def _linear(inverse: Floats, stiffness: Floats, damping: Floats, force: Floats, start: Ints) -> Linear:
+def _linear(
+    inverse: Floats,
+    stiffness: Floats,
+    damping: Floats,
+    orders: Ints,
+    force: NDArray[np.complex128],
+    start: Ints,
+) -> Linear:
     stiffness_values, stiffness_span = _diagonals(stiffness)
     damping_values, damping_span = _diagonals(damping)
     skew = 0.5 * (stiffness - stiffness.T)
     skew[abs(skew) <= 1e-12 * abs(stiffness).max()] = 0.0  # rounding of the assembly
     # Contiguous: otherwise kernels are compiled again for such rigs.
     skew_row, skew_column = (np.ascontiguousarray(index) for index in np.nonzero(skew))
-    force_row = np.flatnonzero(np.any(force != 0, axis=0))
+    which, force_row = (np.ascontiguousarray(index) for index in np.nonzero(force))
     return Linear(
         start=start,
         inverse=inverse,
@@ -274,8 +288,9 @@ def _linear(inverse: Floats, stiffness: Floats, damping: Floats, force: Floats, 
         circulation_row=skew_row,
         circulation_column=skew_column,
         force_row=force_row,
-        force_cosine=force[0, force_row],
-        force_sine=force[1, force_row],
+        force_order=orders[which],
+        force_cosine=force.real[which, force_row],
+        force_sine=-force.imag[which, force_row],
     )
 
 

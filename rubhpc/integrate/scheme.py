@@ -35,6 +35,7 @@ def scheme_of(
     *,
     is_bent: bool = False,
     is_updated: bool = False,
+    has_harmonics: bool = False,
     stators: Sequence[AnyStator] = (),
 ) -> Scheme:
     """Return the initial scheme of a case.
@@ -45,6 +46,8 @@ def scheme_of(
         Whether a stator has second-order geometry.
     is_updated : bool
         Whether a normal turns.
+    has_harmonics : bool
+        Whether forces act at multiples of the spin.
     stators : sequence
         Of the rig.
 
@@ -57,5 +60,5 @@ def scheme_of(
     if integrator.method == "central-difference":
         return Scheme.CENTRAL_DIFFERENCE
     is_own = any(stator.has_own_contact for stator in stators)
-    is_general = is_bent or is_updated or is_own or not contact.are_laws_closed
+    is_general = is_bent or is_updated or is_own or has_harmonics or not contact.are_laws_closed
     return Scheme.COLLOCATION if is_general else Scheme.EVENT_DRIVEN

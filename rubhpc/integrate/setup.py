@@ -169,7 +169,14 @@ def prepare(
     is_bent = any(stator.squared_slope is not None for stator in model.stators)
     has_bore = any(stator.is_bore for stator in model.stators)
     is_updated = contact.normal == "updated" and (has_bore or moves_across(model))
-    scheme = scheme_of(contact, integrator, is_bent=is_bent, is_updated=is_updated, stators=rig.stator)
+    scheme = scheme_of(
+        contact,
+        integrator,
+        is_bent=is_bent,
+        is_updated=is_updated,
+        has_harmonics=bool(model.harmonics),
+        stators=rig.stator,
+    )
     if integrator.method == "modal":
         if 2.0 * math.pi / abs(speed) > LONGEST_TURN:
             least = 2.0 * math.pi / LONGEST_TURN

@@ -11,7 +11,7 @@ import numpy as np
 
 from rubhpc.errors import InputError
 from rubhpc.fem.model import state_size
-from rubhpc.fem.response import check_response_node, steady_response
+from rubhpc.fem.response import check_response_node, steady_lines
 from rubhpc.fem.stability import instability_message
 from rubhpc.fem.statics import rigid_body_row
 from rubhpc.integrate.modal_setup import ModalSetup
@@ -250,16 +250,16 @@ def _shared(setup: Setup) -> _Shared:
 
 
 def _contact_free(setup: Setup, spin: float) -> State:
-    """The steady unbalance response about the sagged shaft at a speed, rad/s; no stator touches."""
+    """Steady response to unbalance and harmonics about the sagged shaft at a speed (rad/s), not touching."""
     known, model = _shared(setup).contact_free, setup.model
     if spin not in known:
         if problem := instability_message(model, spin):
             raise InputError(f'[initial] from: {problem}; set from = "rest"')
-        response = steady_response(model, spin)
+        lines = steady_lines(model, spin)
         known[spin] = replace(
             State.at_rest(model),
-            rotor_displacement=model.sag + response.real,
-            rotor_velocity=(1j * spin * response).real,
+            rotor_displacement=model.sag + sum(line.real for line in lines.values()),
+            rotor_velocity=np.sum([(1j * order * spin * line).real for order, line in lines.items()], axis=0),
         )
     return known[spin]
 

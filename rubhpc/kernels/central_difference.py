@@ -35,7 +35,7 @@ from rubhpc.kernels.contact_pairs import (
     rim_sense,
 )
 from rubhpc.kernels.laws import is_bouncing, is_penalty, is_plain
-from rubhpc.kernels.linear import Linear, circulatory_power, free_velocity
+from rubhpc.kernels.linear import Linear, circulatory_power, free_velocity, turning_force
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -151,7 +151,7 @@ def advance(
         accumulator.peak_lateral,
         accumulator.energy,
     )
-    force_row, force_cosine, force_sine = linear.force_row, linear.force_cosine, linear.force_sine
+    force_row = linear.force_row
     n_dof, q = displacement.size, gap.size
     twist = output_row[2]
     is_direct = is_plain(pairs.law)
@@ -215,7 +215,7 @@ def advance(
                     loss += velocity[k] * damping_force[k]
                 energy[DAMPING_LOSS] += step * loss
                 for k in range(force_row.size):
-                    force = force_cosine[k] * cosine + force_sine[k] * sine
+                    force = turning_force(linear, k, cosine, sine)
                     energy[UNBALANCE_WORK] += step * force * centred(force_row[k], velocity, velocity_next)
                 if i_step == 0 and twist >= 0:
                     samples.rotor[TWIST_ACCELERATION, i_sample] = (
@@ -238,7 +238,7 @@ def advance(
                         energy[DAMPING_LOSS] += residual[k] * damping_force[k]
                     energy[DAMPING_LOSS] += circulatory_power(linear, displacement, residual)
                     for k in range(force_row.size):
-                        force = force_cosine[k] * cosine + force_sine[k] * sine
+                        force = turning_force(linear, k, cosine, sine)
                         if force_row[k] >= 0:
                             energy[UNBALANCE_WORK] += force * residual[force_row[k]]
             for k in range(n_dof):

@@ -33,7 +33,8 @@ class Linear(Struct):
     circulation: Floats  # (n_circulation,), skew part of K, N/m (energy balance only)
     circulation_row: Ints  # (n_circulation,)
     circulation_column: Ints  # (n_circulation,)
-    force_row: Ints  # (n_force,), rows on which the unbalance acts
+    force_row: Ints  # (n_force,), rows on which unbalance and harmonics act
+    force_order: Ints  # (n_force,), multiple of the spin
     force_cosine: Floats  # (n_force,), N
     force_sine: Floats  # (n_force,), N
 
@@ -65,6 +66,15 @@ def add_columns(columns: Floats, x: Floats, y: Floats) -> None:
 
 
 @linked
+def turning_force(linear: Linear, k: int, cosine: float, sine: float) -> float:
+    """Force k (N) at the shaft's angle."""
+    a, b = cosine, sine
+    for _ in range(1, linear.force_order[k]):
+        a, b = a * cosine - b * sine, a * sine + b * cosine
+    return float(linear.force_cosine[k] * a + linear.force_sine[k] * b)
+
+
+@linked
 def free_velocity(
     linear: Linear,
     step: float,
@@ -88,9 +98,7 @@ def free_velocity(
         residual[i] = -step * (residual[i] + damping_force[i])
         velocity_next[i] = velocity[i]
     for k in range(linear.force_row.size):
-        residual[linear.force_row[k]] += step * (
-            linear.force_cosine[k] * cosine + linear.force_sine[k] * sine
-        )
+        residual[linear.force_row[k]] += step * turning_force(linear, k, cosine, sine)
     for b in range(linear.start.size - 1):
         first, last = linear.start[b], linear.start[b + 1]
         add_columns(linear.inverse[b], residual[first:last], velocity_next[first:last])

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rubhpc.rig.carriers import AnyCarrier
-    from rubhpc.rig.rotors import Load, Unbalance
+    from rubhpc.rig.rotors import Harmonic, Load, Unbalance
     from rubhpc.rig.stators import AnyStator
 
 
@@ -101,6 +101,7 @@ class Rig:
         carriers: Sequence[AnyCarrier] = (),
         unbalance: Sequence[Unbalance] = (),
         load: Sequence[Load] = (),
+        harmonic: Sequence[Harmonic] = (),
         gravity: float | str = 0.0,
         clearance_from: float | str = UNLOADED,
         output_node: int | None = None,
@@ -125,6 +126,8 @@ class Rig:
         unbalance : sequence of Unbalance
         load : sequence of Load
             Constant forces.
+        harmonic : sequence of Harmonic
+            Forces at multiples of the spin speed.
         gravity : float (m/s2) or str with a unit
             Acts along -v on every mass of `M`; 0 by default.
         clearance_from : float (rad/s) or str
@@ -155,6 +158,7 @@ class Rig:
             degrees=parse_field(declared["degrees"], degrees, "degrees"),
             unbalance=_tuple(unbalance),
             load=_tuple(load),
+            harmonic=_tuple(harmonic),
             gravity=parse_quantity(gravity, "m/s^2", "gravity"),
             clearance_from=parse_field(declared["clearance_from"], clearance_from, "clearance_from"),
             output_node=output_node,
@@ -171,6 +175,7 @@ class Rig:
         carriers: Sequence[AnyCarrier] = (),
         unbalance: Sequence[Unbalance] = (),
         load: Sequence[Load] = (),
+        harmonic: Sequence[Harmonic] = (),
         gravity: float | str = 0.0,
         clearance_from: float | str = UNLOADED,
         speed: float | str | None = None,
@@ -197,6 +202,8 @@ class Rig:
             At nodes from 1; a ROSS rotor has none.
         load : sequence of Load
             Constant forces at nodes from 1.
+        harmonic : sequence of Harmonic
+            Forces at multiples of the spin speed, at nodes from 1.
         gravity : float (m/s2) or str with a unit
             0 by default.
         clearance_from : float (rad/s) or str
@@ -222,6 +229,7 @@ class Rig:
         found = replace(
             found,
             load=_tuple(load),
+            harmonic=_tuple(harmonic),
             gravity=parse_quantity(gravity, "m/s^2", "from_ross: gravity"),
             clearance_from=parse_field(
                 declared["clearance_from"], clearance_from, "from_ross: clearance_from"

@@ -60,8 +60,19 @@ class Load(Placed):
     )
 
 
+@dataclass(frozen=True, kw_only=True)
+class Harmonic(Placed):
+    """A force that rotates at a multiple of the spin speed, such as that of a misaligned coupling at 2X."""
+
+    order: int = count(at_least=1, doc="Multiple of the spin speed.", example="2")
+    force: float = quantity("N", doc="Size of the force.", example='"50 N"', at_least=0)
+    phase: float = quantity(
+        "rad", doc="Angle from +y towards +z at time zero.", example='"90 deg"', default=0.0
+    )
+
+
 UNLOADED, STANDSTILL = "unloaded", "standstill"
-NodeForce: TypeAlias = Unbalance | Load
+NodeForce: TypeAlias = Unbalance | Load | Harmonic
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -70,6 +81,9 @@ class RotorForces:
 
     unbalance: tuple[Unbalance, ...] = table(doc="Unbalance masses.", default=())
     load: tuple[Load, ...] = table(doc="Constant forces.", default=())
+    harmonic: tuple[Harmonic, ...] = table(
+        doc="Forces at multiples of the spin speed.", default=(), added=True
+    )
     gravity: float = quantity(
         "m/s^2",
         doc="Gravitational acceleration, towards -y.",

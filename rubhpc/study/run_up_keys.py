@@ -15,6 +15,7 @@ from rubhpc.study.speed_law import SpeedLaw
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from rubhpc.rig.rig import Rig
     from rubhpc.study.tables import Integrator, Recording
 
 
@@ -52,6 +53,13 @@ def check_changing(
         raise InputError("[grid] clearance_ratio: the speed changes; give clearance instead")
     if STATE in recording.keep:
         raise InputError(f'[record] keep: the state of a run-up is not stored; remove "{STATE}"')
+
+
+def check_forces(rig: Rig) -> None:
+    """Refuse forces on a rotor that need a constant speed."""
+    if rig.rotor.harmonic:
+        problem = "the speed changes, and harmonics need a constant one"
+        raise InputError(f"rig {rig.name}: [[rotor.harmonic]]: {problem}; remove them from the rig")
 
 
 @dataclass(frozen=True, kw_only=True)

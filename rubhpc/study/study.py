@@ -36,7 +36,7 @@ from rubhpc.study.contact_keys import Contact, ContactKeys
 from rubhpc.study.drive_keys import DriveKeys, check_drive, first_speed
 from rubhpc.study.initial import CONTACT_FREE, Initial, check_initials
 from rubhpc.study.refine import Refine
-from rubhpc.study.run_up_keys import RunUpKeys, check_run_up, refuse_speeds, speed_axis
+from rubhpc.study.run_up_keys import RunUpKeys, check_forces, check_run_up, refuse_speeds, speed_axis
 from rubhpc.study.sampling import draw
 from rubhpc.study.state_of_case import with_state
 from rubhpc.study.tables import Integrator, Recording, Run, Sample, check_method
@@ -180,7 +180,8 @@ def _check_rig(rig: Rig, axes: tuple[Axis, ...]) -> None:
     if not rig.stator:
         raise InputError(f"rig: {rig.name} has no stator to touch; add a [[stator]] to it")
     by_name = {axis.name: axis for axis in axes}
-    if "clearance_ratio" in by_name and not any(u.mass * u.radius for u in rig.rotor.unbalance):
+    forces = [*(u.mass * u.radius for u in rig.rotor.unbalance), *(h.force for h in rig.rotor.harmonic)]
+    if "clearance_ratio" in by_name and not any(forces):
         problem = f"{rig.name} has no unbalance, so no contact-free amplitude"
         raise InputError(f"[grid] clearance_ratio: {problem}; give clearance instead, or an unbalance")
     if "clearance" in by_name:
@@ -287,6 +288,8 @@ class Study:
         check_run_up(self.run_up, self.axes, self.integrator, self.recording, others)
         others = others or ("run_up" if self.run_up is not None else "")
         check_drive(self.drive, self.axes, self.integrator, self.recording, others)
+        if self.run_up is not None or self.drive is not None:
+            check_forces(self.rig)
         check_axes(self.axes)
         if self.refine is not None:
             self.refine.refined(self.axes)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rubhpc.errors import InputError
+from rubhpc.identification import nested
 from rubhpc.identification.nested import Alone, sample
 
 MEAN, STD = np.array([0.4, 0.6]), np.array([0.02, 0.05])
@@ -39,6 +40,14 @@ def test_evidence_and_posterior_of_a_gaussian():
     assert np.exp(one.log_volumes).sum() == pytest.approx(1)
     volume = float(np.exp(one.log_volumes) @ one.values[:, 0])
     assert volume == pytest.approx(0.5, abs=0.1)  # the points weighted by their volumes are the prior
+
+
+def test_a_likelihood_without_end_is_left(monkeypatch):
+    monkeypatch.setattr(nested, "_MOST", 6)
+    one = found(Alone(), lambda values: 1e3 * math.sin(1e6 * values.sum()))
+    assert 600 < one.n_call < 2000
+    assert not one.is_whole
+    assert np.exp(one.log_weights).sum() == pytest.approx(1)
 
 
 def test_processes_change_nothing():

@@ -249,7 +249,8 @@ class PieceSetup(ModalSetup):
             modes.enter,
             np.ones(modes.exponent.size, bool),
             turning,
-            response,
+            np.ones(1, dtype=np.int64),
+            response[:, None],
         )
 
     def library(self, friction: float) -> ModeLibrary:

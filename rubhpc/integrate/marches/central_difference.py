@@ -149,7 +149,7 @@ def _start(setup: CentralDifferenceSetup, initial: State, pairs: Pairs, work: Wo
     velocity = gather(initial.rotor_velocity, initial.stator_velocity)
     work.force[:] = initial.contact_force
     is_free = packed.degree_row >= 0
-    free_force = packed.force[0] - packed.stiffness @ displacement - packed.damping @ velocity
+    free_force = packed.force.real.sum(axis=0) - packed.stiffness @ displacement - packed.damping @ velocity
     # The forces of a step act along the normals of its free update, which depends slightly on them.
     for _ in range(N_START if setup.is_updated else 1):
         force = free_force.copy()

@@ -106,8 +106,10 @@ class FlightModes:
         The other modes are real.
     turning : complex, 1/s
         Exponent of the unbalance force.
-    response : (2 n,)
-        Motion under it.
+    orders : (f,)
+        Multiples of it that are exponents of forces: 1 of the unbalance, then those of harmonics.
+    response : (2 n, f)
+        Motions under them.
     """
 
     setup: Settings
@@ -116,18 +118,19 @@ class FlightModes:
     entry: Complexes
     is_complex: NDArray[np.bool_]
     turning: complex
+    orders: NDArray[np.int64]
     response: Complexes
 
     @cached_property
     def n_complex(self) -> int:
-        """Number of complex modes, of which the response to the unbalance is the last."""
-        return int(np.count_nonzero(self.is_complex)) + 1
+        """Number of complex modes, of which the responses to turning forces are the last."""
+        return int(np.count_nonzero(self.is_complex)) + self.orders.size
 
     @cached_property
     def exponent(self) -> Complexes:
         """Exponents (nm,) in the order of the coordinates, 1/s."""
         turns = self.is_complex
-        return np.concatenate([self.eigenvalue[turns], [self.turning], self.eigenvalue[~turns]])
+        return np.concatenate([self.eigenvalue[turns], self.orders * self.turning, self.eigenvalue[~turns]])
 
     @cached_property
     def shape(self) -> Complexes:
@@ -137,9 +140,9 @@ class FlightModes:
 
     @cached_property
     def enter(self) -> Complexes:
-        """Modes from reduced displacements and velocities, less the response to the unbalance (nm, 2 n)."""
+        """Modes from reduced displacements and velocities, less the responses to forces (nm, 2 n)."""
         turns = self.is_complex
-        none = np.zeros((1, self.entry.shape[1]))
+        none = np.zeros((self.orders.size, self.entry.shape[1]))
         return np.concatenate([self.entry[turns], none, self.entry[~turns]])
 
     def rows(self, values: Complexes) -> Floats:
@@ -155,12 +158,13 @@ class FlightModes:
 
     def coordinates(self, motion: Floats, cosine: float = 1.0, sine: float = 0.0) -> Floats:
         """Coordinates (nx,) of a reduced motion (2 n,) at the shaft's angle."""
-        n, response = self.n_complex, self.response.real * cosine - self.response.imag * sine
+        n, turned = self.n_complex, (cosine + 1j * sine) ** self.orders
+        response = (self.response.real * turned.real - self.response.imag * turned.imag).sum(axis=1)
         z = self.enter @ (motion - response)
         z += self.enter @ (
             motion - response - (self.shape @ z).real
         )  # modes between others are not quite inverse
-        z[n - 1] = cosine + 1j * sine
+        z[n - self.orders.size : n] = turned
         return np.concatenate([z[:n].real, z[:n].imag, z[n:].real])
 
     @cached_property
@@ -327,7 +331,7 @@ class FlightModes:
         )
 
     def _powers(self) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats, int, Floats]:
-        """Powers as products of rows over the coordinates: losses by damping, then works of the unbalance.
+        """Powers as products of rows over the coordinates: losses by damping, then works of turning forces.
 
         Returns the places of both factors of each product, its sign, the number of losses, and the rows.
         """
@@ -340,15 +344,21 @@ class FlightModes:
         u, circulation, v = np.linalg.svd(skew)
         round_ = circulation > UNSEEN * np.abs(reduced.stiffness).max()
         d, c = len(dampers), int(round_.sum())
-        turned = np.zeros((2, self.exponent.size), dtype=complex)
-        turned[:, self.n_complex - 1] = 1.0, -1j
         rows = [dampers @ going, u.T[round_] @ going, (circulation[:, None] * v)[round_] @ displaced]
-        forces = np.array([reduced.force[0], reduced.force[1]])
-        rows += [forces @ going, turned]
-        first = d + 2 * c
-        left = np.concatenate([np.arange(d + c), [first, first + 1]])
-        right = np.concatenate([np.arange(d), d + c + np.arange(c), [first + 2, first + 3]])
-        sign = np.concatenate([np.sign(size[keep]), np.ones(c + 2)])
+        basis = reduced.basis[: self.setup.model.rotor.n_dof]
+        forces = [
+            *reduced.force,
+            *(part @ basis for _, f in self.setup.model.harmonics for part in (f.real, -f.imag)),
+        ]
+        turned = np.zeros((len(forces), self.exponent.size), dtype=complex)
+        at = self.n_complex - self.orders.size + np.arange(self.orders.size)
+        turned[::2][np.arange(at.size), at], turned[1::2][np.arange(at.size), at] = 1.0, -1j
+        rows += [np.array(forces) @ going, turned]
+        first, n_force = d + 2 * c, len(forces)
+        works = first + np.arange(n_force)
+        left = np.concatenate([np.arange(d + c), works])
+        right = np.concatenate([np.arange(d), d + c + np.arange(c), works + n_force])
+        sign = np.concatenate([np.sign(size[keep]), np.ones(c + n_force)])
         return left, right, sign, d + c, self.rows(np.concatenate(rows))
 
 

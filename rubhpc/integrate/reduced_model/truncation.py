@@ -55,10 +55,11 @@ MOST_MODES = 400  # kept because of the estimate; `cutoff_frequency` may require
 def cutoff_frequency(model: Model, spin: float, accuracy: float) -> float:
     """Frequency, rad/s, up to which all modes are kept and probes agree with the full model.
 
-    Ten times the contact frequency (the rotor's inertia on the stator's static stiffness), or the spin where
-    that is higher, times `(1e-3 / accuracy)^(1/4)`; infinite for rigid walls.
+    Ten times the contact frequency (the rotor's inertia on the stator's static stiffness), or the spin times
+    the highest order of a force where that is higher, times `(1e-3 / accuracy)^(1/4)`; infinite for rigid
+    walls.
     """
-    fastest = max(at_standstill(model).contact_frequency, abs(spin))
+    fastest = max(at_standstill(model).contact_frequency, model.highest_order * abs(spin))
     return float(CUTOFF_RATIO * (1e-3 / accuracy) ** 0.25 * fastest)
 
 
