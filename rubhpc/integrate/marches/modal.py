@@ -217,7 +217,8 @@ class ModalMarch(March):
         sample_level = self.clock.sample_level
         restart_clock(self._bare_progress, self.sample << sample_level, self.sample, is_recorded=is_recorded)
         self._ended = None
-        self.clock = self.clock._replace(n_sample=samples.rotor.shape[1])
+        if self.clock.n_sample != samples.rotor.shape[1]:
+            self.clock = self.clock._replace(n_sample=samples.rotor.shape[1])
         while True:
             outcome = self._kernel(stop << sample_level, samples, accumulator, is_recorded)
             self.n_step = int(self._bare_progress["n_step"])
