@@ -255,18 +255,13 @@ class Step:
         return np.array(columns).T
 
     def matrix(self):
-        """The same by `fill_matrix`: its factors put together."""
+        """The same by `fill_matrix`, from its inverse."""
         self.residual()
         given = self.bodies, self.nodes, self.tables, self.slot, self.state, self.force
         blocks = 0, 2 * self.nodes.at.size - 1
         assert interpreted(newton.fill_matrix)(*given, self.n_closed, blocks, self.solution)
-        used = self.solution.used[0]
-        factors, pivot = (of[used, : self.n] for of in (self.solution.matrix, self.solution.pivot))
-        factors = factors[:, : self.n]
-        upper = np.triu(factors, 1) + np.diag(1.0 / np.diag(factors))
-        found = (np.tril(factors, -1) + np.eye(self.n)) @ upper
-        for k in range(self.n - 1, -1, -1):
-            found[[k, pivot[k]]] = found[[pivot[k], k]]
+        inverse = self.solution.matrix[self.solution.used[0], : self.n, : self.n]
+        found = np.linalg.inv(inverse).T
         return found * self.size
 
 

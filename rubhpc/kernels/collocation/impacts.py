@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.collocation.gaps import see_bend, see_gap
 from rubhpc.kernels.collocation.laws import friction_ratio, spring_force
-from rubhpc.kernels.collocation.newton import factorise, solve_factorised
+from rubhpc.kernels.collocation.newton import invert, multiply
 from rubhpc.kernels.collocation.structures import (
     FRICTION,
     NORMAL,
@@ -77,7 +77,7 @@ def find_forces(bodies: Bodies, s: int, state: Ints, solution: Solution, force: 
     """
     q, n_local, n_row = state.size, bodies.n_local, bodies.load.shape[0]
     start, normal, tangent = solution.start, solution.normal, solution.tangent
-    matrix, wanted, pivot = np.zeros((2 * q, 2 * q)), np.zeros(2 * q), np.zeros(2 * q, np.int64)
+    matrix, wanted, found = np.zeros((2 * q, 2 * q)), np.zeros(2 * q), np.zeros(2 * q)  # transposed
     for i in range(q):
         if state[i] != OPEN:
             see_rates(bodies, s, i, solution)
@@ -99,23 +99,23 @@ def find_forces(bodies: Bodies, s: int, state: Ints, solution: Solution, force: 
             wanted[i] = -opening
             for j in range(q):
                 if state[j] != OPEN:
-                    matrix[i, j] = coupling(bodies, normal, row, i, normal, j * s, j)
-                    matrix[i, q + j] = coupling(bodies, normal, row, i, tangent, j * s, j)
+                    matrix[j, i] = coupling(bodies, normal, row, i, normal, j * s, j)
+                    matrix[q + j, i] = coupling(bodies, normal, row, i, tangent, j * s, j)
         else:
             wanted[i] = spring_force(bodies, i, solution.gap[row], solution.seen[row, RATE])[0]
         if state[i] == STICKING:
             wanted[q + i] = slipping
             for j in range(q):
                 if state[j] != OPEN:
-                    matrix[q + i, j] = coupling(bodies, tangent, row, i, normal, j * s, j)
-                    matrix[q + i, q + j] = coupling(bodies, tangent, row, i, tangent, j * s, j)
+                    matrix[j, q + i] = coupling(bodies, tangent, row, i, normal, j * s, j)
+                    matrix[q + j, q + i] = coupling(bodies, tangent, row, i, tangent, j * s, j)
         else:
-            matrix[q + i, i] = -state[i] * friction_ratio(bodies, i, solution.seen[row, SLIP])[0]
-    if not factorise(matrix, pivot, 2 * q):
+            matrix[i, q + i] = -state[i] * friction_ratio(bodies, i, solution.seen[row, SLIP])[0]
+    if not invert(matrix, solution.pivot, 2 * q):
         return False
-    solve_factorised(matrix, pivot, 2 * q, wanted)
+    multiply(matrix, 2 * q, wanted, found)
     for i in range(q):
-        force[i, NORMAL], force[i, FRICTION] = wanted[i], wanted[q + i]
+        force[i, NORMAL], force[i, FRICTION] = found[i], found[q + i]
     return True
 
 

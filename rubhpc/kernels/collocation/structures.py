@@ -121,8 +121,9 @@ class Solution(Struct):
     residual: Floats  # (n,)
     closed: Ints  # (q,), the closed pairs, then open ones that may touch in the step
     size: Floats  # (nm,), of modes
-    matrix: Floats  # (k m, n, n), factors: m of each length of step
-    pivot: Ints  # (k m, n)
+    answer: Floats  # (n,), change of the unknowns
+    matrix: Floats  # (k m, n, n), inverses, transposed: m of each length of step
+    pivot: Ints  # (n,)
     states: Ints  # (k m,), states of the pairs with which a matrix was made, as one number; 0: none
     noise: Floats  # (k m,), force that the rounding of displacements causes, N
     used: Ints  # (2,), matrix of the last step, and number of pairs that are closed or may touch in it

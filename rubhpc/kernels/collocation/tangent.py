@@ -29,9 +29,9 @@ from rubhpc.kernels.collocation.newton import (
     change_residual,
     list_closed,
     move_freely,
+    multiply,
     n_force,
     see_start,
-    solve_factorised,
 )
 from rubhpc.kernels.collocation.observing import N_LOOK, value_at
 from rubhpc.kernels.collocation.structures import (
@@ -112,7 +112,7 @@ def carry_step(
     step, n_x = tables.tick * 2.0 ** (tables.first_level + slot), trail.column.size
     blocks, listed = (0, 2 * s - 1), (0, n_closed)
     change, moved, begun, pushed = solution.change, solution.moved, solution.begun, solution.pushed
-    column, load, target = trail.column, trail.load, solution.residual
+    column, load, target, answer = trail.column, trail.load, solution.residual, solution.answer
     forced, free, local = tables.forced[slot], tables.free[slot], bodies.local
     for i in range(pushed.shape[0]):
         for k in range(s):
@@ -158,7 +158,7 @@ def carry_step(
                     if a != TWIST:
                         target[row] = -change[first + a]
                         row += 1
-        solve_factorised(solution.matrix[solution.used[0]], solution.pivot[solution.used[0]], n, target)
+        multiply(solution.matrix[solution.used[0]], n, target, answer)
         row = 0
         for p in range(n_closed):
             i = solution.closed[p]
@@ -166,7 +166,7 @@ def carry_step(
                 for k in range(s):
                     for a in range(n_local):
                         at = k * n_row + i * n_local + a
-                        load[at] -= solution.direction[i * s + k, f, a] * target[row]
+                        load[at] -= solution.direction[i * s + k, f, a] * answer[row]
                     row += 1
         for p in range(n_closed if has_place else 0):
             i = solution.closed[p]
@@ -176,7 +176,7 @@ def carry_step(
                         continue
                     for a in range(n_local):
                         at = k * n_row + i * n_local + a
-                        load[at] -= solution.turning[i * s + k, a, b] * target[row]
+                        load[at] -= solution.turning[i * s + k, a, b] * answer[row]
                     row += 1
         if taken == 1.0:
             end_of_step(bodies, tables, slot, column, load, trail.after)
