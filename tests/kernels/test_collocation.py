@@ -13,7 +13,7 @@ from trial_rig import trial_rig
 from rubhpc import State
 from rubhpc.integrate.marches.collocation import CollocationMarch
 from rubhpc.integrate.setup import prepare
-from rubhpc.kernels.collocation import events, gaps, impacts, newton, tables
+from rubhpc.kernels.collocation import equations, events, gaps, impacts, motions, newton, tables
 from rubhpc.kernels.collocation.structures import (
     ACROSS,
     BACKWARD,
@@ -196,8 +196,8 @@ class Step:
         interpreted(tables.fill_step)(bodies, self.nodes, self.tables, slot)
         n_row, self.has_place = bodies.load.shape[0], not bodies.is_straight
         self.x = march._modes.coordinates(march._motion + 1e-4 * rng.normal(size=march._motion.size))
-        interpreted(newton.see_start)(bodies, self.x, self.solution)
-        self.n_closed, self.n_pushed, self.n = interpreted(newton.list_closed)(
+        interpreted(motions.see_start)(bodies, self.x, self.solution)
+        self.n_closed, self.n_pushed, self.n = interpreted(motions.list_closed)(
             bodies, self.nodes, self.state, self.solution
         )
         interpreted(newton.use_matrix)(bodies, self.tables, slot, self.state, self.solution)
@@ -208,7 +208,7 @@ class Step:
         self.solution.place[0] = self.solution.start[:n_row]
         self.unknown, self.size = [], []
         for i in np.flatnonzero(self.state):
-            n_force = interpreted(newton.n_force)(bodies, self.state[i])
+            n_force = interpreted(motions.n_force)(bodies, self.state[i])
             self.unknown += [(self.force, (i, f, k)) for f in range(n_force) for k in range(s)]
         self.size += [1.0] * len(self.unknown)
         for i in np.flatnonzero(self.state) if self.has_place else []:
@@ -223,9 +223,9 @@ class Step:
         for i in np.flatnonzero(self.state):
             for k in range(s):
                 interpreted(gaps.see_gap)(self.bodies, i, solution.place[k], i * n_local, i * s + k, solution)
-        interpreted(newton.push_closed)(*given)
+        interpreted(motions.push_closed)(*given)
         blocks, pairs = (0, 2 * s - 1), (0, self.n_closed)
-        interpreted(newton.respond)(
+        interpreted(motions.respond)(
             self.bodies,
             s,
             self.tables.forced[self.slot],
@@ -236,10 +236,12 @@ class Step:
             solution,
         )
         if not self.has_place:
-            interpreted(newton.follow_loads)(self.bodies, self.nodes, self.n_closed, solution)
-            interpreted(newton.see_gaps)(self.bodies, self.nodes, self.n_closed, solution)
+            interpreted(motions.follow_loads)(self.bodies, self.nodes, self.n_closed, solution)
+            interpreted(motions.see_gaps)(self.bodies, self.nodes, self.n_closed, solution)
         is_lean = False
-        interpreted(newton.fill_residual)(*given[:2], self.tables, self.slot, *given[2:5], is_lean, solution)
+        interpreted(equations.fill_residual)(
+            *given[:2], self.tables, self.slot, *given[2:5], is_lean, solution
+        )
         return self.solution.residual[: self.n].copy()
 
     def by_differences(self):

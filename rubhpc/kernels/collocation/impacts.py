@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.collocation.gaps import see_bend, see_gap
 from rubhpc.kernels.collocation.laws import friction_ratio, spring_force
-from rubhpc.kernels.collocation.newton import invert, multiply
 from rubhpc.kernels.collocation.structures import (
     FRICTION,
     NORMAL,
@@ -19,6 +18,7 @@ from rubhpc.kernels.collocation.structures import (
     Bodies,
     Solution,
 )
+from rubhpc.kernels.elimination import eliminate
 from rubhpc.kernels.laws import LAGRANGE
 
 Floats = NDArray[np.float64]
@@ -77,13 +77,13 @@ def find_forces(bodies: Bodies, s: int, state: Ints, solution: Solution, force: 
     """
     q, n_local, n_row = state.size, bodies.n_local, bodies.load.shape[0]
     start, normal, tangent = solution.start, solution.normal, solution.tangent
-    matrix, wanted, found = np.zeros((2 * q, 2 * q)), np.zeros(2 * q), np.zeros(2 * q)  # transposed
+    rows, last = np.zeros((2 * q, 2 * q + 1)), 2 * q  # the last column is what is wanted
     for i in range(q):
         if state[i] != OPEN:
             see_rates(bodies, s, i, solution)
     for i in range(q):
         row, first = i * s, i * n_local
-        matrix[i, i], matrix[q + i, q + i] = 1.0, 1.0
+        rows[i, i], rows[q + i, q + i] = 1.0, 1.0
         if state[i] == OPEN:
             continue
         see_bend(bodies, row, solution)
@@ -96,26 +96,25 @@ def find_forces(bodies: Bodies, s: int, state: Ints, solution: Solution, force: 
                 opening += both * solution.normal_bend[a, b]
                 slipping -= both * solution.tangent_bend[a, b]
         if bodies.normal_law[i] == LAGRANGE:
-            wanted[i] = -opening
+            rows[i, last] = -opening
             for j in range(q):
                 if state[j] != OPEN:
-                    matrix[j, i] = coupling(bodies, normal, row, i, normal, j * s, j)
-                    matrix[q + j, i] = coupling(bodies, normal, row, i, tangent, j * s, j)
+                    rows[i, j] = coupling(bodies, normal, row, i, normal, j * s, j)
+                    rows[i, q + j] = coupling(bodies, normal, row, i, tangent, j * s, j)
         else:
-            wanted[i] = spring_force(bodies, i, solution.gap[row], solution.seen[row, RATE])[0]
+            rows[i, last] = spring_force(bodies, i, solution.gap[row], solution.seen[row, RATE])[0]
         if state[i] == STICKING:
-            wanted[q + i] = slipping
+            rows[q + i, last] = slipping
             for j in range(q):
                 if state[j] != OPEN:
-                    matrix[j, q + i] = coupling(bodies, tangent, row, i, normal, j * s, j)
-                    matrix[q + j, q + i] = coupling(bodies, tangent, row, i, tangent, j * s, j)
+                    rows[q + i, j] = coupling(bodies, tangent, row, i, normal, j * s, j)
+                    rows[q + i, q + j] = coupling(bodies, tangent, row, i, tangent, j * s, j)
         else:
-            matrix[i, q + i] = -state[i] * friction_ratio(bodies, i, solution.seen[row, SLIP])[0]
-    if not invert(matrix, solution.pivot, 2 * q):
+            rows[q + i, i] = -state[i] * friction_ratio(bodies, i, solution.seen[row, SLIP])[0]
+    if not eliminate(rows, 2 * q):
         return False
-    multiply(matrix, 2 * q, wanted, found)
     for i in range(q):
-        force[i, NORMAL], force[i, FRICTION] = found[i], found[q + i]
+        force[i, NORMAL], force[i, FRICTION] = rows[i, last], rows[q + i, last]
     return True
 
 

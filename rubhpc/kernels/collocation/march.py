@@ -30,7 +30,8 @@ from rubhpc.kernels.collocation.impacts import (
     stop_opening,
     stop_slip,
 )
-from rubhpc.kernels.collocation.newton import list_closed, see_start, take_step
+from rubhpc.kernels.collocation.motions import list_closed, see_start
+from rubhpc.kernels.collocation.newton import take_step
 from rubhpc.kernels.collocation.observing import (
     Seen,
     Signals,

@@ -122,8 +122,8 @@ class Solution(Struct):
     closed: Ints  # (q,), the closed pairs, then open ones that may touch in the step
     size: Floats  # (nm,), of modes
     answer: Floats  # (n,), change of the unknowns
+    rows: Floats  # (n, 2 n), a matrix beside the identity
     matrix: Floats  # (k m, n, n), inverses, transposed: m of each length of step
-    pivot: Ints  # (n,)
     states: Ints  # (k m,), states of the pairs with which a matrix was made, as one number; 0: none
     noise: Floats  # (k m,), force that the rounding of displacements causes, N
     used: Ints  # (2,), matrix of the last step, and number of pairs that are closed or may touch in it

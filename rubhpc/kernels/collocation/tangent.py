@@ -20,19 +20,12 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels._struct import Struct
+from rubhpc.kernels.collocation.equations import change_pair, change_residual
 from rubhpc.kernels.collocation.gaps import see_bend
 from rubhpc.kernels.collocation.impacts import find_forces, find_impulses, push_instant, see_rates
 from rubhpc.kernels.collocation.laws import static_friction
-from rubhpc.kernels.collocation.newton import (
-    add_response,
-    change_pair,
-    change_residual,
-    list_closed,
-    move_freely,
-    multiply,
-    n_force,
-    see_start,
-)
+from rubhpc.kernels.collocation.motions import add_response, list_closed, move_freely, n_force, see_start
+from rubhpc.kernels.collocation.newton import multiply
 from rubhpc.kernels.collocation.observing import N_LOOK, value_at
 from rubhpc.kernels.collocation.structures import (
     FRICTION,
