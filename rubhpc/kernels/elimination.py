@@ -30,9 +30,9 @@ def eliminate(rows: Floats, n: int) -> bool:
             chosen[j] = other[j]
             other[j] = held
         for i in range(n):
-            if i != k:
-                target = rows[i]
-                factor = target[k]
+            target = rows[i]
+            factor = target[k]
+            if i != k and factor != 0.0:
                 for j in range(k, width):
                     target[j] -= factor * other[j]
     return True
