@@ -37,6 +37,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 ACCURACY = 1e-4  # of forces, at most: periodic motions close to about a hundredth of it
+UNRELATED = 1e-25  # of the largest: less is of motions that do not act on each other, and spoils eigenvectors
 STATE_BITS = 2  # of a pair in the number of all states
 
 
@@ -230,6 +231,7 @@ class CollocatedMotion:
         columns = np.eye(2 * self.n)
         for revolution in revolutions:
             columns = self._carried(revolution.last, columns)
+        columns[np.abs(columns) < UNRELATED * np.abs(columns).max()] = 0.0
         return columns
 
     def revolve_with(self, motion: Floats, states: int, columns: Floats) -> tuple[Floats, int, Floats]:
