@@ -292,6 +292,38 @@ def test_the_matrix_has_the_slopes_of_the_residuals(contact, state, geometry, no
     assert error.max() < 2e-6
 
 
+@pytest.mark.parametrize("normal", ["fixed", "updated"])
+@pytest.mark.parametrize("geometry", ["linear", "second_order"])
+def test_open_pairs_that_touch_in_a_step_are_near(geometry, normal):
+    """Under random loads of a closed pair, of every size: some are near and stay open, none is missed."""
+    march, bodies = march_of(3, geometry=geometry, normal=normal, accuracy=0.1)
+    modes, solution, rng = march._modes, march._solution, np.random.default_rng(11)
+    s, n_local, n_row = modes.nodes.at.size, bodies.n_local, bodies.load.shape[0]
+    slot, state = modes.tables.is_filled.size - 1, np.array([FORWARD, OPEN, OPEN])
+    interpreted(tables.fill_step)(bodies, modes.nodes, modes.tables, slot)
+    step = modes.tables.tick * 2.0 ** (modes.tables.first_level + slot)
+    listed, touched = 0, 0
+    for size in np.repeat(np.geomspace(1e-8, 1e2, 13), 4):
+        x = modes.coordinates(march._motion + size * 1e-4 * rng.normal(size=march._motion.size))
+        interpreted(motions.see_start)(bodies, x, solution)
+        solution.load[:] = 0.0
+        solution.load.reshape(s, n_row)[:, :n_local] = size * rng.normal(size=(s, n_local))
+        solution.closed[0] = 0
+        n = interpreted(motions.list_near)(bodies, modes.nodes, step, x, state, 1, solution)
+        near = set(solution.closed[1:n].tolist())
+        begun = solution.start[:n_row].copy()
+        y = modes.tables.free[slot] @ x + modes.tables.forced[slot].T @ solution.load
+        for i in range(1, 3):
+            places = [begun[i * n_local : (i + 1) * n_local]]
+            first = [interpreted(tables.place_row)(s, n_local, i, k) for k in range(1, s)]
+            places += [y[row : row + n_local] for row in first]
+            touches = min(interpreted(gaps.gap_of)(bodies, i, q, 0) for q in places) <= 0.0
+            assert not touches or i in near
+            touched += touches
+        listed += len(near)
+    assert 0 < touched < listed < 2 * 52
+
+
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("restitution", [0.0, 0.6])
 def test_impulses_obey_newton_and_coulomb(seed, restitution):
