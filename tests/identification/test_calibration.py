@@ -15,6 +15,7 @@ from rubhpc.running.pool import Pool
 STUDY = "jobs/identification/calibration.toml"
 SIGNALS = ("vertical", "horizontal", "torsion")
 STEP = 2e-6  # s, of the independent code
+DRAWS = 10  # a truth of it takes ten seconds
 
 
 def trials(count, noises, **given):
@@ -90,20 +91,20 @@ def test_a_posterior_that_is_known_is_not_computed_again(tmp_path, monkeypatch):
 
 
 @pytest.mark.long
-@pytest.mark.timeout(7200)
+@pytest.mark.timeout(1800)
 def test_truths_of_an_independent_code_lie_in_their_posteriors(monkeypatch, tmp_path):
     monkeypatch.setattr(calibration, "simulated", independent(calibration.simulated, 400))
     calibration._truth.cache_clear()
-    some = trials(100, [0.01, 0.3], output=str(tmp_path))
+    some = trials(DRAWS, [0.01, 0.3], output=str(tmp_path))
     found = calibrate_on(Pool(), some, report=lambda text: None)
     calibration._truth.cache_clear()
     print("\n".join(["", *in_table(some, found)]))
-    shares = (np.array([one.ranks for one in found]).reshape(100, 2, 2) + 0.5) / 100
+    shares = (np.array([one.ranks for one in found]).reshape(DRAWS, 2, 2) + 0.5) / 100
     for level in range(2):
         for key in range(2):
             ranks = shares[:, level, key]
             assert kstest(ranks, "uniform").pvalue > 1e-3
             for share in COVERED:
                 inside = np.count_nonzero(np.abs(ranks - 0.5) <= 0.5 * share)
-                low, high = binom.interval(0.999, 100, share)
+                low, high = binom.interval(0.999, DRAWS, share)
                 assert low <= inside <= high, (level, key, share)

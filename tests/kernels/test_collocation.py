@@ -20,6 +20,7 @@ from rubhpc.kernels.collocation.structures import (
     BENDING,
     FORWARD,
     FRICTION,
+    MATRIX,
     OPEN,
     RATE,
     SLIP,
@@ -262,7 +263,7 @@ class Step:
         given = self.bodies, self.nodes, self.tables, self.slot, self.state, self.force
         blocks = 0, 2 * self.nodes.at.size - 1
         assert interpreted(newton.fill_matrix)(*given, self.n_closed, blocks, self.solution)
-        inverse = self.solution.matrix[self.solution.used[0], : self.n, : self.n]
+        inverse = self.solution.matrix[self.solution.used[MATRIX], : self.n, : self.n]
         found = np.linalg.inv(inverse).T
         return found * self.size
 

@@ -13,6 +13,7 @@ from rubhpc.kernels.collocation.observing import value_at
 from rubhpc.kernels.collocation.structures import (
     FRICTION,
     GAP,
+    N_NEAR,
     NORMAL,
     OPEN,
     RATE,
@@ -85,7 +86,7 @@ def root_between(
 def is_near(i: int, solution: Solution) -> bool:
     """Whether a pair is closed or may touch in the step that was solved last."""
     is_listed = False
-    for p in range(solution.used[1]):
+    for p in range(solution.used[N_NEAR]):
         is_listed = is_listed or solution.closed[p] == i
     return is_listed
 

@@ -48,6 +48,7 @@ from rubhpc.kernels.collocation.structures import (
     FORWARD,
     FRICTION,
     JAMMED,
+    MATRIX,
     NORMAL,
     OPEN,
     RATE,
@@ -583,7 +584,7 @@ def advance_by_collocation(
                     case.force,
                     solution.guess,
                     is_continued,
-                    solution.noise[solution.used[0]],
+                    solution.noise[solution.used[MATRIX]],
                     solution,
                 )
                 error *= min(1.0, step / AVERAGED)

@@ -134,16 +134,13 @@ def respond(
     n_local, n_row, closed, y = bodies.n_local, bodies.load.shape[0], solution.closed, solution.y
     for p in range(pairs[0], pairs[1]):
         first = place_row(s, n_local, closed[p], 1)
-        begin, end = first + blocks[0] * n_local, first + blocks[1] * n_local
-        for r in range(begin, end):
+        for r in range(first + blocks[0] * n_local, first + blocks[1] * n_local):
             y[r] = solution.y_free[r]
-        for node in range(0, load.size, n_row):
-            for c in range(n_closed):
-                begun = node + closed[c] * n_local
-                for a in range(begun, begun + n_local):
-                    size, row = load[a], forced[a]
-                    for r in range(begin, end):
-                        y[r] += size * row[r]
+    for node in range(0, load.size, n_row):
+        for c in range(n_closed):
+            begun = node + closed[c] * n_local
+            for a in range(begun, begun + n_local):
+                add_response(bodies, s, load[a], forced[a], blocks, pairs, y, solution)
 
 
 @linked_sum

@@ -28,6 +28,8 @@ from rubhpc.kernels.collocation.motions import (
 )
 from rubhpc.kernels.collocation.structures import (
     FRICTION,
+    MATRIX,
+    N_NEAR,
     NORMAL,
     STICKING,
     TWIST,
@@ -148,7 +150,7 @@ def fill_matrix(
                 fill_column(bodies, nodes, tables, slot, state, force, n_closed, col, solution)
                 moved[k, i * n_local + b] = 0.0
                 col += 1
-    rows, inverse = solution.rows, solution.matrix[solution.used[0]]
+    rows, inverse = solution.rows, solution.matrix[solution.used[MATRIX]]
     for r in range(col):
         for k in range(col):
             rows[r, col + k] = 1.0 if k == r else 0.0
@@ -194,7 +196,7 @@ def noise_of(
                 for k in range(s):
                     residual[row + k] = ROUNDING * size * (1.0 if k % 2 == 0 else -1.0)
             row += s
-    multiply(solution.matrix[solution.used[0]], n, residual, solution.answer)
+    multiply(solution.matrix[solution.used[MATRIX]], n, residual, solution.answer)
     noise = 0.0
     for r in range(n_pushed):
         noise = max(noise, abs(solution.answer[r]))
@@ -222,7 +224,7 @@ def use_matrix(bodies: Bodies, tables: Tables, slot: int, state: Ints, solution:
     used = slot * n_way + way
     if solution.states[used] != code:
         solution.states[used] = 0
-    solution.used[0] = used
+    solution.used[MATRIX] = used
     return code
 
 
@@ -258,7 +260,7 @@ def take_step(
     used_blocks = (0, s if is_lean else n_block)
     step, forced = tables.tick * 2.0 ** (tables.first_level + slot), tables.forced[slot]
     code = use_matrix(bodies, tables, slot, state, solution)
-    used = solution.used[0]
+    used = solution.used[MATRIX]
     see_motions(bodies, x, 2 * n_row, solution)
     listed = (0, n_closed)
     move_freely(bodies, s, free, x, used_blocks, listed, solution.y_free, solution)
@@ -291,7 +293,7 @@ def take_step(
                 move_freely(bodies, s, free, x, (used_blocks[1], n_block), listed, solution.y_free, solution)
                 move_freely(bodies, s, free, x, (0, n_block), (n_closed, n_near), solution.y_free, solution)
                 respond(bodies, s, forced, n_closed, rest, near, load, solution)
-                solution.used[1] = n_near
+                solution.used[N_NEAR] = n_near
             for c in range(n_closed):
                 see_pair(bodies, nodes, solution.closed[c], is_lean and not is_whole, solution)
             if not is_exact:

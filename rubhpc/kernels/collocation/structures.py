@@ -95,6 +95,7 @@ GAP, RATE, SLIP, TURNED, WIDENED, BEND = range(6)  # of a pair at a node: column
 OF_RATE, OF_SLIP, OF_BEND = range(3)  # their slopes in the local displacements: rows of `bent`
 BY_GAP, BY_RATE, BY_GAP_TWICE, BY_BOTH = range(4)  # slopes of a spring law: columns of `slope`
 RATIO, RATIO_SLOPE = 0, 1  # of friction: columns of `ratio`
+MATRIX, N_NEAR = range(2)  # the matrix, and how many pairs are closed or may touch: items of `used`
 
 
 class Solution(Struct):
@@ -126,7 +127,7 @@ class Solution(Struct):
     matrix: Floats  # (k m, n, n), inverses, transposed: m of each length of step
     states: Ints  # (k m,), states of the pairs with which a matrix was made, as one number; 0: none
     noise: Floats  # (k m,), force that the rounding of displacements causes, N
-    used: Ints  # (2,), matrix of the last step, and number of pairs that are closed or may touch in it
+    used: Ints  # (2,), of the last step: see `MATRIX`
     change: Floats  # (ny,), of y
     moved: Floats  # (s, R), of `place`
     begun: Floats  # (3 R,), of `start`

@@ -29,6 +29,7 @@ from rubhpc.kernels.collocation.newton import multiply
 from rubhpc.kernels.collocation.observing import N_LOOK, value_at
 from rubhpc.kernels.collocation.structures import (
     FRICTION,
+    MATRIX,
     NORMAL,
     OPEN,
     TWIST,
@@ -151,7 +152,7 @@ def carry_step(
                     if a != TWIST:
                         target[row] = -change[first + a]
                         row += 1
-        multiply(solution.matrix[solution.used[0]], n, target, answer)
+        multiply(solution.matrix[solution.used[MATRIX]], n, target, answer)
         row = 0
         for p in range(n_closed):
             i = solution.closed[p]
