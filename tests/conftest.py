@@ -78,7 +78,7 @@ SLOW = (
     "integrate/changing_speed/test_run_up_machines.py",
     "integrate/changing_speed/test_steep_run_ups.py",
     "integrate/test_simulate.py::test_energy_balances[3-",
-    "integrate/test_tangent_motion.py::test_tangent_is_that_of_the_saltation_matrices[ring",
+    "integrate/test_carried_tangent.py::test_columns_are_those_of_the_monodromy_of_each_revolution[ring",
     "integrate/test_transient.py::test_laws_without_closed_form_settle_as_with_auto",
     "kernels/test_accumulators.py",
     "kernels/test_cache.py",
