@@ -6,19 +6,18 @@ import math
 import time
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from rubhpc.integrate.carried_tangent import CarriedTangent
-from rubhpc.integrate.compilation import COLLOCATION, COMMON, PERIODIC, RUN_UPS, seconds_compiling
+from rubhpc.integrate.compilation import COLLOCATION, COMMON, PERIODIC, seconds_compiling
 from rubhpc.integrate.lyapunov import Growth, Marches
 from rubhpc.integrate.marched_record import march_record
 from rubhpc.integrate.marches.central_difference import CentralDifferenceMarch
 from rubhpc.integrate.marches.collocation import CollocationMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.marches.met_modes import NoClosedForm
-from rubhpc.integrate.marches.modal import ModalMarch
 from rubhpc.integrate.measuring.divergence import diverged_record
 from rubhpc.integrate.measuring.measures import measures_of
 from rubhpc.integrate.measuring.monitors import carrier_displacement, monitored
@@ -55,6 +54,7 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.model import Model
     from rubhpc.integrate.marches.march import March
+    from rubhpc.integrate.marches.modal import ModalMarch
     from rubhpc.integrate.measuring.measures import Judge
     from rubhpc.integrate.measuring.regimes import Verdict
     from rubhpc.integrate.periodic_motions.collocated_motion import FollowedMotion
@@ -104,6 +104,11 @@ class Case:
         """Make what follows its motions, from a state or from where a march stands that is needed no more."""
         make = followed_motion(self.scheme, **options)
         return make(self.setup, self.clearance, self.friction, initial, march)
+
+    @property
+    def has_tangent(self) -> bool:
+        """Whether its motions can be followed with small changes of them."""
+        return self.scheme is not Scheme.CENTRAL_DIFFERENCE
 
 
 def run_case(
@@ -181,12 +186,11 @@ def reached(revolution: float) -> str:
     return f"a case at revolution {revolution:.0f} of its record"
 
 
-def kernel_sets(setup: Setup, *, changes_speed: bool = False) -> set[str]:
+def kernel_sets(setup: Setup) -> set[str]:
     """Return the sets of kernels that a case of this set-up may need (`compilation`)."""
     if not isinstance(setup, ModalSetup):
         return {COMMON}
-    sets = {COMMON, RUN_UPS} if changes_speed else {COMMON}
-    return sets | {COLLOCATION if setup.scheme is Scheme.COLLOCATION else PERIODIC}
+    return {COMMON, COLLOCATION if setup.scheme is Scheme.COLLOCATION else PERIODIC}
 
 
 def compile_kernels(
@@ -218,7 +222,8 @@ def _integrate(case: Case, initial: State) -> Record:
     n_step = 0
     per_revolution = setup.samples_per_revolution
     settings = {"spin_speed": setup.spin, "clearance": case.clearance}
-    if recording.is_transient_direct and isinstance(march, ModalMarch):
+    if recording.is_transient_direct and case.has_tangent:
+        march = cast("ModalMarch", march)
         motions = solved_motions(march.setup, (case.clearance, case.friction, recording))
         march, reason, n_transient, n_step, motion = pass_directly(
             march, partial(case.motion, None), recording, motions
@@ -293,7 +298,7 @@ def _integrate(case: Case, initial: State) -> Record:
             n_exponent=recording.lyapunov,
         )
         if recording.lyapunov:
-            record.measures.update(exponents_of(last, march, final))
+            record.measures.update(exponents_of(last, final))
         if "waveform" not in recording.keep:
             record.signals.clear()
     if motion is not None:
@@ -314,10 +319,10 @@ def _spectra(samples: Samples, model: Model) -> dict[str, Floats]:
     return {f"spectrum_{name}": spectrum for name, spectrum in spectra.items() if name not in unasked}
 
 
-def exponents_of(case: Case, march: March, final: State) -> dict[str, float]:
-    """Lyapunov exponents from where a march has ended; NaN where it has no tangent."""
+def exponents_of(case: Case, final: State) -> dict[str, float]:
+    """Lyapunov exponents from where a case has ended; NaN where it has no tangent."""
     n_exponent = case.recording.lyapunov
-    if not isinstance(march, ModalMarch):
+    if not case.has_tangent:
         return dict.fromkeys(lyapunov_variables(n_exponent), math.nan)
     found = spectrum_of(partial(case.motion, final), n_exponent)
     largest = found["lyapunov_1"]
@@ -329,13 +334,13 @@ def judge_of(case: Case, march: March, final: State, n_event: float) -> Judge:
 
     A march of the case that is needed no more is started again; `n_event` are the events in a revolution.
     """
-    solver = Solver(case.motion, final, march) if isinstance(march, ModalMarch) else None
+    solver = Solver(case.motion, final, cast("ModalMarch", march)) if case.has_tangent else None
 
     def growth_from(state: State) -> Growth:
-        if isinstance(march, ModalMarch):
-            accuracy = march.setup.accuracy
-            return Growth(lambda: CarriedTangent(case.motion(state, march, accuracy=accuracy)))
-        return Growth(lambda: Marches(case.march, state, case.setup, case.recording))
+        if not case.has_tangent:
+            return Growth(lambda: Marches(case.march, state, case.setup, case.recording))
+        accuracy = cast("ModalSetup", case.setup).accuracy
+        return Growth(lambda: CarriedTangent(case.motion(state, march, accuracy=accuracy)))
 
     def lasts(exponent: float) -> bool:
         """Whether chaos was followed to the end of what is followed, does not drift and is chaos there."""

@@ -176,20 +176,7 @@ def integrate_run_up(
         while not reason and (place := piece - begins_at) < len(block):
             first = int(cuts[piece])
             note(first / cuts[-1])
-            stretch, before_it, follows = None, (earlier, before[piece]), goes_on or place > 0
-            if not late[piece]:
-                stretch = passing.take_several(
-                    block, place, size, reached, before_it, goes_on=goes_on or place > 0
-                )
-            if stretch is not None:
-                part = min(size, per_revolution)
-                parts = np.arange(first, first + stretch.n_piece * size, part)
-                gathered.add_all(parts // per_revolution, stretch.sums)
-                whole[:, first : first + stretch.n_piece * size] = stretch.whole
-                reached, earlier = stretch.end, stretch.last
-                n_step += stretch.n_step
-                piece += stretch.n_piece
-                continue
+            before_it, follows = (earlier, before[piece]), goes_on or place > 0
             passed = passing.take(block[place], size, reached, before_it, goes_on=follows)
             reached, earlier = passed.end, passed.accumulators[-1]
             if late[piece]:  # the inertia of the twist does not follow immediately

@@ -171,7 +171,7 @@ class CollocationMarch(ModalMarch):
         return 0, self._case.x.reshape(2, -1).copy()
 
     def keep_fast(self, before: tuple[int, Floats], spin: float, since: float) -> None:
-        """Let fast modes go on as they were before a piece (`EventDrivenMarch.keep_fast`)."""
+        """Let fast modes go on as they were before a piece (`ModalMarch.keep_fast`)."""
         z, fast = self._case.x.reshape(2, -1), np.abs(self._contacts.exponent) > slowest_fast(spin, since)
         fast[-1] = False  # the response to the unbalance
         z[:, fast] = before[1][:, : fast.size][:, fast]
