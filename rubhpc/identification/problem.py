@@ -26,7 +26,7 @@ from rubhpc.input.reading import read_toml
 from rubhpc.rig.reading import read_rig
 from rubhpc.study.axes import SPEED_AXES
 from rubhpc.study.axis_reading import flatten
-from rubhpc.study.identity import physics_of
+from rubhpc.study.identity import PHYSICS
 from rubhpc.study.study import line_of_text, overridden, study_of, table_of
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ class Problem:
         study = rub.machine.study
         names = [prior.name for prior in rub.priors]
         table = {
-            "physics": physics_of(study),
+            "physics": PHYSICS,
             "study": {**study.as_dict(), "title": "", "rig": study.rig.as_dict()},
             "open": names,
             "spin": self.channels.spin,
