@@ -11,7 +11,7 @@ import numpy as np
 
 from rubhpc.integrate.measuring.divergence import energy_limit
 from rubhpc.integrate.reduced_model.contact_mode import ContactMode, confine, solve_contact_mode
-from rubhpc.integrate.reduced_model.flight_modes import FlightModes
+from rubhpc.integrate.reduced_model.flight_modes import FlightModes, motion_rows
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
 from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions, kernel_bodies
 from rubhpc.integrate.reduced_model.system_modes import KeptParts, solve_parts
@@ -80,6 +80,16 @@ class ModalSetup:
     release: Release | None = None
     is_measured: bool = True  # False: tables have no outputs and energies
     _libraries: dict[float, ModeLibrary] = field(default_factory=dict)
+
+    @property
+    def has_energies(self) -> bool:
+        """Whether records have the losses by damping and the works of turning forces."""
+        return self.is_measured
+
+    @cached_property
+    def local_motions(self) -> Floats:
+        """Local motions of each pair (`flight_modes.motion_rows`)."""
+        return motion_rows(self.reduced, self.model, self.accuracy)
 
     @cached_property
     def energy_limit(self) -> float:
