@@ -254,6 +254,7 @@ def take_event(
     else:
         solution.waiting[pair] = True
         state[pair] = STICKING
+        stop_slip(bodies, s, pair, solution, x)
         memory.slot = max(memory.slot - 4, lowest)
     memory.slot = min(memory.slot, top)
 
@@ -604,7 +605,7 @@ def advance_by_collocation(
                     memory.why = UNCONVERGED if why == 0 else why
                     return CONTACT_UNSOLVED
             fill_events(bodies, nodes, state, solution.guess, accuracy, solution)
-            place, pair, kind = first_event(bodies, nodes, state, solution)
+            place, pair, kind = first_event(bodies, nodes, step, state, solution)
             if pair >= 0 and memory.length == 0 and slot > 0:  # so soon after another event
                 memory.slot = slot - 1
                 continue
@@ -620,6 +621,7 @@ def advance_by_collocation(
                 pair = -1
             if taken == 0 and memory.n_at_once > UNDECIDED * state.size and pair >= 0:
                 taken, pair = whole, -1
+                memory.n_at_once = 0
             if progress.tick + taken > last_tick:
                 taken, pair = last_tick - progress.tick, -1
             if taken > 0:
