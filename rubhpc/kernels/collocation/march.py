@@ -299,7 +299,8 @@ def strike(
         if not solution.touching[i]:
             continue
         see_rates(bodies, s, i, solution)
-        if not solution.bound[i] and (solution.impulse[i, NORMAL] == 0.0 or bodies.restitution[i] > 0.0):
+        may_rebound = bodies.restitution[i] > 0.0 and not solution.kept[i]  # what was closed and is hit stays
+        if not solution.bound[i] and (solution.impulse[i, NORMAL] == 0.0 or may_rebound):
             rate = solution.seen[i * s, RATE]
             if rate > PARTED * (bodies.rim_speed[i] + approach) + 1e-12:
                 state[i], solution.waiting[i] = OPEN, False
