@@ -54,14 +54,24 @@ def fit_to_gaps(state: State, setup: Setup, clearance: float) -> State:
     Raises
     ------
     InputError
-        The state is of a rig with other degrees of freedom, or the stators leave no room for the shaft.
+        The state is of a rig with other degrees of freedom, or the stators leave no room for the shaft, or no
+        start without overlap is found near the state.
     """
     if state.packed().size != state_size(setup.model):
         raise InputError(
             f"initial: a state of {state.packed().size} numbers for a rig of {state_size(setup.model)}; "
             "use it only for cases with the same degrees of freedom"
         )
-    return _fitted(state, setup, clearance)[0]
+    fitted, is_found = _fitted(state, setup, clearance)
+    if not is_found:
+        gap, _ = gaps(fitted.displacement, setup, clearance)
+        allowed = 0.0 if state.overlap is None else state.overlap
+        if np.any(gap + allowed < -PARTED):
+            raise InputError(
+                f"initial: no start within the clearances is found near this state, which overlaps by "
+                f"{-gap.min():.2g} m; start nearer to the clearance, or from rest"
+            )
+    return fitted
 
 
 def _fitted(state: State, setup: Setup, clearance: float, *, is_soft: bool = False) -> tuple[State, bool]:

@@ -617,7 +617,8 @@ def advance_by_collocation(
                 if state[pair] == OPEN:
                     acceleration = acceleration_of(nodes, step, solution.seen[pair * s : pair * s + s])
                     if solution.seen[pair * s, RATE] > 0.0:
-                        taken = max(taken, 1)  # what opens does not touch at once: such touches have no end
+                        # Neither at once, nor faster than it has left: such rebounds have no end.
+                        taken = max(int(place * whole), 1)
             else:
                 pair = -1
             if taken == 0 and memory.n_at_once > UNDECIDED * state.size and pair >= 0:
