@@ -64,12 +64,12 @@ def fit_to_gaps(state: State, setup: Setup, clearance: float) -> State:
         )
     fitted, is_found = _fitted(state, setup, clearance)
     if not is_found:
-        gap, _ = gaps(fitted.displacement, setup, clearance)
+        left, begun = (gaps(one.displacement, setup, clearance)[0] for one in (fitted, state))
         allowed = 0.0 if state.overlap is None else state.overlap
-        if np.any(gap + allowed < -PARTED):
+        if np.any(left + allowed < -PARTED):
             raise InputError(
-                f"initial: no start within the clearances is found near this state, which overlaps by "
-                f"{-gap.min():.2g} m; start nearer to the clearance, or from rest"
+                f"initial: this state overlaps by {-begun.min():.2g} m, and no start within the clearances is "
+                "found near it; start nearer to them, or from rest"
             )
     return fitted
 

@@ -19,6 +19,7 @@ from rubhpc.fem.beam import stator_foreshortening
 from rubhpc.integrate import case
 from rubhpc.integrate.marches import collocation
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
+from rubhpc.integrate.marches.march import ended_in
 from rubhpc.integrate.scheme import Scheme
 from rubhpc.recent import forget
 from rubhpc.rig.reading import with_keys
@@ -428,3 +429,11 @@ def test_rebounds_in_a_ring_come_to_rest(stator, given, touches):
     assert record.reason == ""
     assert record.energy_residual < 5e-4
     assert 1 < record.contacts_per_revolution.sum() < touches
+
+
+@pytest.mark.parametrize("reason", collocation.WHY.values())
+def test_reason_of_an_end_names_the_revolution_before_what_may_help(reason):
+    said = ended_in(reason, 7)
+    what, _, fix = said.partition(" in revolution 7")
+    assert what + fix == reason
+    assert ";" not in what
