@@ -54,7 +54,7 @@ def fit_to_gaps(state: State, setup: Setup, clearance: float) -> State:
     Raises
     ------
     InputError
-        The state is of a rig with other degrees of freedom, or the stators leave no room for the shaft, or no
+        The state is of a rig with other degrees of freedom, the stators leave no room for the shaft, or no
         start without overlap is found near the state.
     """
     if state.packed().size != state_size(setup.model):
@@ -68,8 +68,8 @@ def fit_to_gaps(state: State, setup: Setup, clearance: float) -> State:
         allowed = 0.0 if state.overlap is None else state.overlap
         if np.any(left + allowed < -PARTED):
             raise InputError(
-                f"initial: this state overlaps by {-begun.min():.2g} m, and no start within the clearances is "
-                "found near it; start nearer to them, or from rest"
+                f"initial: this state overlaps by {-begun.min():.2g} m, and no start within the clearances "
+                "is found near it; start nearer to them, or from rest"
             )
     return fitted
 
