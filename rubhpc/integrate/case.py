@@ -17,6 +17,7 @@ from rubhpc.integrate.marched_record import march_record
 from rubhpc.integrate.marches.central_difference import CentralDifferenceMarch
 from rubhpc.integrate.marches.collocation import CollocationMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
+from rubhpc.integrate.marches.march import ended_in
 from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.measuring.divergence import diverged_record
 from rubhpc.integrate.measuring.measures import measures_of
@@ -259,7 +260,7 @@ def _integrate(case: Case, initial: State) -> Record:
         n_kept = samples_within(samples, n_before + march.sample, setup.displacement_limit)
         revolution = n_transient + min(n_kept // per_revolution + 1, recording.revolutions)
         record = diverged_record(
-            f"{reason} in revolution {revolution}",
+            ended_in(reason, revolution),
             len(setup.model.stators),
             recording,
             settings,

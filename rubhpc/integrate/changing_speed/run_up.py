@@ -20,6 +20,7 @@ from rubhpc.integrate.changing_speed.passing import Passing, state_at
 from rubhpc.integrate.changing_speed.pieces import Pieces
 from rubhpc.integrate.changing_speed.turns import Turns, bring_to_angles
 from rubhpc.integrate.changing_speed.twist_ramp import moved, sag_ramp
+from rubhpc.integrate.marches.march import ended_in
 from rubhpc.integrate.marches.modal import Place
 from rubhpc.integrate.measuring.samples import empty_samples, lift_samples, new_accumulator, probe_part
 from rubhpc.integrate.record import State
@@ -189,7 +190,7 @@ def integrate_run_up(
                 gathered.add(first // per_revolution + i, accumulator)
             if passed.reason:
                 n_done = first // per_revolution + len(passed.accumulators) - 1
-                reason = f"{passed.reason} in revolution {n_done + 1}"
+                reason = ended_in(passed.reason, n_done + 1)
             piece += 1
         if ramp is not None:
             ramp.lift(whole[:, cuts[begins_at] : cuts[piece]], setup)

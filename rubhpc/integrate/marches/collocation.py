@@ -68,12 +68,14 @@ class Contacts(NamedTuple):
     memory: NDArray[Any]  # (1,)
 
 
-WHY = {  # a case cannot continue
+SOFTER = 'a softer contact (law = "penalty" or "hertz"), or another accuracy'
+WHY = {  # a case cannot continue; then what may help
     0: "the motion diverges",
-    JAMMED: "friction presses a closed gap further closed (Painleve's paradox): lower the friction",
-    UNCONVERGED: "the contact forces of the shortest step were not found",
-    ENDLESS: "events follow without end",
-    SINGULAR: NO_FORCES,
+    JAMMED: "friction presses a closed gap further closed (Painleve's paradox); lower the friction",
+    UNCONVERGED: "the contact forces of the shortest step were not found; set "
+    f'friction_law = "coulomb" if friction is to end where slip does, {SOFTER}',
+    ENDLESS: f"events follow without end; set {SOFTER}, lower the restitution, or give the stator more mass",
+    SINGULAR: f"{NO_FORCES}; lower the friction, or set {SOFTER}",
 }
 
 
