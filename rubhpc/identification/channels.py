@@ -93,6 +93,14 @@ class Channels:
                 return shares
         return None
 
+    @property
+    def deflection(self) -> float:
+        """Largest amplitude of a displacement, m; 0 where none is measured."""
+        sizes = self.waves.std(axis=1)
+        return math.sqrt(2.0) * max(
+            (size for size, unit in zip(sizes, self.units, strict=True) if unit == "m"), default=0.0
+        )
+
     def of_record(self, signals: Mapping[str, Floats]) -> Floats:
         """Return these signals of a record, (n_channel, n_sample)."""
         return np.stack([np.atleast_2d(signals[name])[0] for name in self.simulated])

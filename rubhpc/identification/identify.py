@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 LIVE, DRAWS = 100, 1000
+FEWEST = 10  # live points of a hypothesis of which only the evidence is asked: half of the others'
 POSTERIOR, CASES = "posterior.nc", "cases"
 
 
@@ -164,10 +165,10 @@ def _identify(
         with writing(folder, "--output"):
             (folder / CASES).mkdir(parents=True, exist_ok=True)
 
-    def say(n_call: int, log_evidence: float, left: float) -> None:
-        report(f"{n_call} cases, ln(evidence) {log_evidence:.1f}, {left:.3g} to come")
+    def simulate(rub: Rub, live: int) -> Sampled:
+        def say(n_call: int, log_evidence: float, left: float) -> None:
+            report(f"{rub.name}: {n_call} cases, ln(evidence) {log_evidence:.1f}, {left:.3g} to come")
 
-    def simulate(rub: Rub) -> Sampled:
         # Kernels are compiled once, and what is wrong with the study is reported, before all processes begin.
         rub.outcome([prior.at(0.5) for prior in rub.priors])
         shared.use(Task(rub=rub, folder=folder and folder / CASES, content=problem.content(rub)))
@@ -181,11 +182,13 @@ def _identify(
             say=say,
         )
 
-    sampled = simulate(problem.rub)
+    sampled = simulate(problem.rub, live)
     evaluator().evaluated.read()  # those of other ranks
     outcomes = [evaluator().outcome(values) for values in sampled.values]
     others = {
-        other: simulate(other) if isinstance(other, Rub) else _sample_alone(other, live, seed)
+        other: simulate(other, max(live // 2, FEWEST))
+        if isinstance(other, Rub)
+        else _sample_alone(other, live, seed)
         for other in problem.others
     }
     found = Found(problem=problem, rub=sampled, others=others, outcomes=outcomes)

@@ -184,11 +184,16 @@ def read_problem(
         priors=known.priors,
     )
     rub, others = hypotheses_of(machine, comparison)
+    slacks = tuple(slack_bearings(machine, comparison)) if slack else ()
+    if slack and not slacks:
+        raise InputError(
+            f"{known.name}: slack: no bearing of the rig has springs to the ground; leave it out"
+        )
     return Problem(
         machine=machine,
         comparison=comparison,
         rub=rub,
-        others=(*others, *(slack_bearings(machine, comparison) if slack else ())),
+        others=(*others, *slacks),
         note=str(data.attrs.get("note", "")),
     )
 

@@ -114,15 +114,92 @@ def test_a_clearance_that_may_be_wide_does_not_hide_a_healthy_machine(tmp_path):
     assert "it is probably no other fault" in text
 
 
+SLACK_RIG = """
+name = "slack"
+[rotor]
+gravity = "9.81 m/s^2"
+clearance_from = "standstill"
+[[rotor.shaft]]
+length = "0.4 m"
+outer_diameter = "20 mm"
+elements = 4
+youngs_modulus = "206 GPa"
+poissons_ratio = 0.3
+density = 7850.0
+[[rotor.disc]]
+node = 3
+diameter = "0.16 m"
+thickness = "20 mm"
+density = 7850.0
+[[rotor.bearing]]
+position = 0.0
+stiffness = 4e6
+damping = "150 N s/m"
+mass = "0.2 kg"
+[[rotor.bearing]]
+node = 5
+stiffness = 4e6
+damping = "150 N s/m"
+[[rotor.unbalance]]
+node = 3
+mass = "3 g"
+radius = "8 cm"
+[rotor.torsion]
+fixed_node = 1
+[rotor.damping]
+alpha = 15.0
+[[carrier]]
+name = "casing"
+mass = "20 kg"
+stiffness = "1e8 N/m"
+[[stator]]
+carrier = "casing"
+kind = "bore"
+node = 3
+mass = "5 kg"
+stiffness = "1e7 N/m"
+"""
+
+
+SLACK_STUDY = """
+rig = "rig.toml"
+[grid]
+clearance = { start = "10 um", stop = "90 um" }
+friction = 0.2
+"rotor.unbalance.mass" = "2 g"
+"rotor.bearing.stiffness" = [1e6, 4e6, 9e6]
+"""
+
+
 def test_slack_bearings_take_the_place_of_springs(tmp_path):
-    files = rubbing_machine.write(tmp_path, rubbing_machine.linear(False, 40, 0.05))
+    files = rubbing_machine.write(tmp_path, rubbing_machine.linear(False, 40, 0.05), SLACK_STUDY)
+    (tmp_path / "rig.toml").write_text(SLACK_RIG)
     problem = read_problem(*files, slack=True)
-    assert [other.name for other in problem.others[2:]] == [f"slack bearing at node {n}" for n in (1, 15)]
-    rig = problem.others[2].machine.study.rig
-    assert [bearing.stiffness_matrix[0][0] for bearing in rig.rotor.bearing] == pytest.approx([1e3, 1e6])
-    (wall,) = rig.stator
-    assert (wall.node, wall.law.stiffness) == (1, pytest.approx(1e6))
-    assert [prior.name for prior in problem.others[2].priors] == ["clearance"]  # none of the rotor is open
+    others = problem.others[2:]
+    assert [other.name for other in others] == [f"slack bearing at node {n}" for n in (1, 5)]
+    rig = others[0].machine.study.rig
+    assert [bearing.stiffness_matrix[0][0] for bearing in rig.rotor.bearing] == pytest.approx([4e3, 4e6])
+    assert rig.rotor.bearing[0].mass == 0.2
+    assert rig.rotor.unbalance[0].mass == pytest.approx(2e-3)  # known by the study
+    _, wall = rig.stator
+    assert (wall.node, wall.law.stiffness) == (1, pytest.approx(4e6))
+    assert rig.rotor.clearance_from == "unloaded"  # not a loose shaft's sag of millimetres
+    # The springs of bearings are no open keys: they would make the slack one stiff again.
+    assert [prior.name for prior in others[0].priors] == ["clearance", "stator.2.law.stiffness"]
+    outcome = others[0].outcome([prior.at(0.5) for prior in others[0].priors])
+    assert outcome.contact_fraction[0] == 0.0
+    assert outcome.contact_fraction[1] > 0.1
+
+
+def test_a_rig_without_springs_has_no_slack_bearings(tmp_path):
+    study = SLACK_STUDY.replace('"rotor.bearing', '# "rotor.bearing')
+    files = rubbing_machine.write(
+        tmp_path, rubbing_machine.linear(False, 40, 0.05), SLACK_STUDY.replace('"rotor.b', '# "')
+    )
+    table = "speed = [10.0, 900.0]\nkyy = [4e6, 4e6]\nkzz = [4e6, 4e6]\n"
+    (tmp_path / "rig.toml").write_text(SLACK_RIG.replace("stiffness = 4e6\n", table))
+    with pytest.raises(InputError, match="slack: no bearing of the rig has springs to the ground"):
+        read_problem(*files, slack=True)
 
 
 def test_a_speed_that_is_known_roughly_is_refined(tmp_path):
