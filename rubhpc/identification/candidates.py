@@ -113,6 +113,7 @@ def simulated(
         friction=case.friction,
         recording=study.recording,
         initial=case.initial,
+        is_judged=False,
     )
 
 

@@ -29,7 +29,7 @@ from rubhpc.integrate.measuring.divergence import diverged_record
 from rubhpc.integrate.measuring.measures import measures_of
 from rubhpc.integrate.measuring.monitors import carrier_displacement, monitored
 from rubhpc.integrate.measuring.orbit_measures import period
-from rubhpc.integrate.measuring.regimes import LASTING, LEAST_REVOLUTIONS, by_growth, regime
+from rubhpc.integrate.measuring.regimes import LASTING, LEAST_REVOLUTIONS, by_growth, regime, undecided
 from rubhpc.integrate.measuring.rub_in_bores import rub_measures
 from rubhpc.integrate.measuring.samples import (
     add_sag,
@@ -95,6 +95,7 @@ def run_case(
     check: Callable[[], None] | None = None,
     say: Callable[[str], None] = lambda _: None,
     note: Callable[[float], None] = lambda _: None,
+    is_judged: bool = True,
 ) -> Record:
     """Integrate one case and measure it.
 
@@ -113,6 +114,8 @@ def run_case(
         Called with the progress of the case as often as `check`, if that is given.
     note : callable
         Called before each `check` with the share of transient and record that is done; 1 after the record.
+    is_judged : bool
+        Whether the regime is found, which may take longer than the record; else it is undecided.
     """
     n_whole = recording.longest_transient + recording.revolutions
     began = time.perf_counter() - seconds_compiling()
@@ -137,11 +140,11 @@ def run_case(
 
     scheme = setup.scheme
     try:
-        record = _integrate(starter(scheme), state, setup, clearance, friction, recording)
+        record = _integrate(starter(scheme), state, setup, clearance, friction, recording, is_judged)
     except NoClosedForm:
         # Contacts that chatter, or too many sets of them.
         scheme = Scheme.COLLOCATION
-        record = _integrate(starter(scheme), state, setup, clearance, friction, recording)
+        record = _integrate(starter(scheme), state, setup, clearance, friction, recording, is_judged)
         record.measures["left_closed_form"] = 1
     record.measures["scheme"] = scheme.flag
     record.measures["modal_error"] = setup.modal_error if isinstance(setup, ModalSetup) else math.nan
@@ -200,6 +203,7 @@ def _integrate(
     clearance: float,
     friction: float,
     recording: Recording,
+    is_judged: bool,
 ) -> Record:
     """March through transient and record, then measure."""
     march = start(initial)
@@ -233,7 +237,7 @@ def _integrate(
         n_step += n_lost
         motion = motion if marched is not None else None
     if marched is None:
-        trail = trail_of(march, recording)
+        trail = trail_of(march, recording) if is_judged else None
         if isinstance(setup, ModalSetup) and setup.release is not None:
             through = record_through(march, setup, recording.revolutions, start)
             marched, march, n_step = through.marched, through.march, n_step + through.n_step
@@ -262,20 +266,14 @@ def _integrate(
     else:
         signals = by_name(samples.whole, setup.model)
         turn = 2.0 * math.pi / abs(setup.spin)
-        judge = (
-            judge_of(
-                march,
-                partial(start, setup=last_setup),
-                last_setup,
-                clearance,
-                friction,
-                recording,
-                final,
-                trail,
-            )
-            if motion is None
-            else motion.judge
-        )
+        judge: Judge
+        if motion is not None:
+            judge = motion.judge
+        elif is_judged:
+            again = partial(start, setup=last_setup)
+            judge = judge_of(march, again, last_setup, clearance, friction, recording, final, trail)
+        else:
+            judge = undecided
         record = Record(
             status=DONE,
             samples_per_revolution=per_revolution,
