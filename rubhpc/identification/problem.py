@@ -194,7 +194,7 @@ def read_problem(
         comparison=comparison,
         rub=rub,
         others=(*others, *slacks),
-        note=str(data.attrs.get("note", "")),
+        note="\n".join(filter(None, [data.attrs.get("note", ""), channels.note])),
     )
 
 

@@ -213,6 +213,28 @@ def test_a_speed_that_is_known_roughly_is_refined(tmp_path):
     assert problem.channels.angle_error == np.inf
 
 
+def test_another_speed_than_that_of_the_record_is_refused(tmp_path):
+    columns = rubbing_machine.linear(True, 40, 0.05)
+    del columns["key_phasor"]
+    measured, study = rubbing_machine.write(tmp_path, columns)
+    measured.write_text(measured.read_text().replace(f"{rubbing_machine.SPIN} rad/s", "330 rad/s"))
+    with pytest.raises(InputError, match=r"probe.csv: \[speed\]: no line is within 2 % of it"):
+        read_problem(measured, study)
+
+
+def test_broken_sensors_are_left_out(tmp_path):
+    columns = rubbing_machine.linear(True, 40, 0.05)
+    columns["torsion"][:] = -0.3
+    columns["horizontal"][columns["time"].size // 3 :] = 0.0
+    problem = read_problem(*rubbing_machine.write(tmp_path, columns))
+    assert problem.channels.names == ("vertical",)
+    assert "column torsion: is -0.3 throughout; check the sensor" in problem.note
+    assert "horizontal: fades to less than a third within the record; left out" in problem.note
+    columns["vertical"][columns["time"].size // 3 :] *= 0.1
+    with pytest.raises(InputError, match="the size of the motion changes by more than a factor of 3"):
+        read_problem(*rubbing_machine.write(tmp_path, columns))
+
+
 @pytest.mark.parametrize(
     ("old", "new", "text"),
     [
