@@ -277,8 +277,7 @@ class Misalignment(NoRub):
     def unknown(self, values: Sequence[float]) -> Unknown | None:
         """Return the forces and the torque, as lines in the channels of one weight of the rotor."""
         model, spin = self.model(values)
-        upright = [i for i, (_, name) in enumerate(model.rotor.degrees) if name == "v"]
-        weight = _GRAVITY * float(model.rotor.mass[np.ix_(upright, upright)].sum())
+        weight = _GRAVITY * mass_of(model)
         first = response_nodes(model)[0]
         rows = [model.rotor.index(first, name) for name in ("v", "w")]
         forces = np.zeros((2, model.rotor.n_dof), dtype=np.complex128)
@@ -304,6 +303,12 @@ def hypotheses_of(machine: Machine, comparison: Comparison) -> tuple[Rub, tuple[
         Rub(machine=machine, comparison=comparison),
         tuple(kind(machine=machine, comparison=comparison) for kind in (NoRub, Misalignment)),
     )
+
+
+def mass_of(model: Model) -> float:
+    """Return the mass of the rotor, kg."""
+    upright = [i for i, (_, name) in enumerate(model.rotor.degrees) if name == "v"]
+    return float(model.rotor.mass[np.ix_(upright, upright)].sum())
 
 
 def _is_of_rotor(name: str) -> bool:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from rubhpc.fem.assemble import assemble, model_at
 from rubhpc.fem.response import contact_free_amplitude
-from rubhpc.identification.candidates import Machine, Rub
+from rubhpc.identification.candidates import Machine, Rub, mass_of
 from rubhpc.identification.priors import read_prior
 from rubhpc.rig.normal_law import NormalLaw
 from rubhpc.rig.parts import Bearing
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from rubhpc.rig.bearing_table import AnyBearing
 
 _LEFT = 1e-3  # of the bearing's springs
+_SAG = 0.3  # of the displacement that counts as divergence, at most under gravity
 _CLEARANCE = (0.03, 10.0)  # over the largest deflection that was measured, or is due without contact
 _WALL = (0.3, 30.0)  # stiffness of the wall over that of the bearing's springs
 _AWAY = 1.0  # m, by which the stators stand off: they keep their bodies, which may be measured
@@ -44,8 +45,10 @@ def slack_bearings(machine: Machine, comparison: Comparison) -> Iterator[Rub]:
     study, spin, file = machine.study, machine.channels.spin, "slack bearing"
     known = {axis.name: axis.values[0] for axis in study.axes if axis.name.startswith("rotor.")}
     rig = with_keys(study.rig, known)
-    due = contact_free_amplitude(model_at(assemble(rig), spin), spin)
-    deflection = max(due, machine.channels.deflection)
+    model = model_at(assemble(rig), spin)
+    deflection = max(contact_free_amplitude(model, spin), machine.channels.deflection)
+    # The equilibrium without the wall, where a march begins, has to be within what counts as divergence.
+    least = mass_of(model) * rig.rotor.gravity / (_SAG * rig.rotor.displacement_limit)
     own = [prior for prior in machine.priors if prior.name.startswith("rotor.")]
     own = [prior for prior in own if not prior.name.startswith("rotor.bearing.")]
     stators = [replace(one, clearance_offset=_AWAY) for one in rig.stator]
@@ -58,7 +61,8 @@ def slack_bearings(machine: Machine, comparison: Comparison) -> Iterator[Rub]:
         stiffness, node = math.sqrt(kyy * kzz), rig.rotor.node_of(bearing)
         if not stiffness:
             continue
-        loose = replace(bearing, stiffness=None, kyy=_LEFT * kyy, kzz=_LEFT * kzz, kyz=0.0, kzy=0.0)
+        left = max(_LEFT * stiffness, least)
+        loose = replace(bearing, stiffness=left, kyy=None, kzz=None, kyz=0.0, kzy=0.0)
         wall = Bore(node=node, rigid=True, radius=_RADIUS, law=NormalLaw(kind="penalty", stiffness=stiffness))
         changed: Any = (*bearings[:i], loose, *bearings[i + 1 :])
         # The bore is about the unloaded shaft: a loose shaft sags far.
