@@ -14,6 +14,7 @@ from rubhpc.commands.identify import identify
 from rubhpc.errors import InputError
 from rubhpc.identification import evaluation
 from rubhpc.identification.problem import read_problem
+from rubhpc.identification.words import _verdict
 
 SMALL = {"live": 16, "draws": 200}
 
@@ -209,6 +210,18 @@ def test_a_speed_that_is_known_roughly_is_refined(tmp_path):
     assert problem.channels.spin == pytest.approx(rubbing_machine.SPIN, rel=2e-5)  # a thousandth of a bin
     assert "repeats" in problem.comparison.about
     assert problem.channels.angle_error == np.inf
+
+
+def test_ties_among_other_faults_are_said():
+    one, other = "slack bearing at node 1", "slack bearing at node 5"
+    evidence = {"rub": (0.0, 0.1), "no rub": (-50.0, 0.1), one: (30.0, 0.5), other: (30.4, 0.5)}
+    assert list(_verdict(evidence, "rub"))[1:] == [
+        f"the data do not distinguish {other} from {one}",
+        "it is one of these: odds of more than a million to 1 against no rub",
+    ]
+    assert list(_verdict(evidence | {one: (0.0, 0.5)}, "rub"))[1:] == [
+        f"it is a {other}: odds of more than a million to 1 against {one}"
+    ]
 
 
 def test_another_speed_than_that_of_the_record_is_refused(tmp_path):
