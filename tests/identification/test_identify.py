@@ -103,6 +103,15 @@ def test_what_is_not_a_rub_is_said(tmp_path, kind):
         assert max(evidence["no rub"], evidence["misalignment"]) > evidence["rub"] + 10
 
 
+@pytest.mark.parametrize("node", [1, 4, 15])
+def test_misalignment_is_found_wherever_it_acts(tmp_path, node):
+    problem = read_problem(*rubbing_machine.write(tmp_path, rubbing_machine.linear(True, 40, 0.05, node)))
+    healthy, misaligned = problem.others
+    assert misaligned.log_likelihood([]) > healthy.log_likelihood([]) + 50
+    seen, unknown = problem.comparison.of(misaligned.waves([])), misaligned.unknown([])
+    assert problem.comparison.misfit(seen, unknown) < 1.5
+
+
 def test_a_clearance_that_may_be_wide_does_not_hide_a_healthy_machine(tmp_path):
     columns = rubbing_machine.linear(False, 40, 0.05)
     study = rubbing_machine.STUDY.replace('stop = "150 um"', 'stop = "400 um"')
