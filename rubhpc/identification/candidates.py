@@ -301,14 +301,6 @@ class Misalignment(NoRub):
 Hypothesis = Rub | NoRub
 
 
-def hypotheses_of(machine: Machine, comparison: Comparison) -> tuple[Rub, tuple[NoRub, ...]]:
-    """Return the rub, and all else that is tried."""
-    return (
-        Rub(machine=machine, comparison=comparison),
-        tuple(kind(machine=machine, comparison=comparison) for kind in (NoRub, Misalignment)),
-    )
-
-
 def mass_of(model: Model) -> float:
     """Return the mass of the rotor, kg."""
     upright = [i for i, (_, name) in enumerate(model.rotor.degrees) if name == "v"]
