@@ -48,11 +48,11 @@ def in_words(found: Found, tree: xr.DataTree) -> Iterator[str]:
     yield "ln(evidence): " + ", ".join(
         f"{name} {value:.1f} +- {error:.1f}" for name, (value, error) in evidence.items()
     )
+    best = max(evidence, key=lambda name: evidence[name][0])
     for one, sampled in ((problem.rub, found.rub), *found.others.items()):
-        if not sampled.is_whole:
+        if not sampled.is_whole and sampled.log_likelihoods.max() > evidence[best][0] - _SURE:
             fix = "it may explain more than was found; narrow the priors"
             yield f"{one.name}: the sampling was ended after {sampled.n_call} cases; {fix}"
-    best = max(evidence, key=lambda name: evidence[name][0])
     if problem.rub.name not in evidence:
         yield "no case of [grid] touches, so that a rub has not been tried; lower the clearance"
     yield from _verdict(evidence, problem.rub.name)
