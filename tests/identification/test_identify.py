@@ -201,6 +201,29 @@ def test_slack_bearings_take_the_place_of_springs(tmp_path):
     assert outcome.contact_fraction[1] > 0.1
 
 
+def test_a_slack_bearing_explains_its_record(tmp_path):
+    columns = rubbing_machine.linear(False, 40, 0.05)
+    del columns["torsion"]
+    files = rubbing_machine.write(tmp_path, columns, SLACK_STUDY)
+    (tmp_path / "rig.toml").write_text(SLACK_RIG)
+    true, values = read_problem(*files, slack=True).others[3], [40e-6, 5e6]
+    signals = true.machine.simulate(values).to_dataset()
+    sensors = {
+        name: rubhpc.Sensor(white=0.02 * float(signals[name].std())) for name in columns.keys() & signals
+    }
+    rate = 200.37 * float(signals["spin_speed"]) / (2 * np.pi)
+    seen = rubhpc.sense(signals, sensors, rate=rate, seed=3)
+    rubbing_machine.write(tmp_path, {name: seen[name].values for name in columns}, SLACK_STUDY)
+    problem = read_problem(*files, slack=True)
+    healthy, misaligned, other, same = problem.others
+    outcome = same.outcome(values)
+    assert problem.comparison.misfit(outcome.seen) < 1.5
+    springs = [prior.at(0.5) for prior in healthy.priors]  # of the bearings
+    logs = [one.log_likelihood(springs) for one in (healthy, misaligned)]
+    most = max(*logs, other.log_likelihood(other.outcome(values)))
+    assert same.log_likelihood(outcome) > most + 50
+
+
 def test_a_rig_without_springs_has_no_slack_bearings(tmp_path):
     study = SLACK_STUDY.replace('"rotor.bearing', '# "rotor.bearing')
     files = rubbing_machine.write(tmp_path, rubbing_machine.linear(False, 40, 0.05), study)
