@@ -156,7 +156,9 @@ def _first(
     reason = ""
     if isinstance(begin, State):
         setup, clearance, friction = branching.family.settings(value)
-        followed = followed_motion(setup)(setup, clearance, friction, fit_to_gaps(begin, setup, clearance))
+        followed = followed_motion(setup.scheme)(
+            setup, clearance, friction, fit_to_gaps(begin, setup, clearance)
+        )
         try:
             return branching.begin(value, followed.start, followed.states, period)
         except (NotConverged, Unfollowed) as problem:

@@ -146,7 +146,7 @@ def compile_kernels(study: Path, trust_rig: bool) -> int:
 
     grid = CaseGrid(read_study(study, trust_rig=trust_rig))
     with announced_by(click.echo):
-        warm_up(grid, grid.sequences()[0][0].start, lambda: None, all_sets=True)
+        warm_up(grid, grid.sequences()[0][0].start, lambda: None)
     click.echo(f"kernels in {cache_folder()}: {seconds_compiling():.0f} s of compilation")
     return 0
 

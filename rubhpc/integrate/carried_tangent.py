@@ -1,48 +1,70 @@
-"""A small displacement of a motion, carried by the tangent of the collocation integrator."""
+"""A small displacement of a motion, carried by the exact tangent of its integrator."""
 
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rubhpc.integrate.lyapunov import N_ALIGNING
 from rubhpc.integrate.measuring.regimes import N_MOST
-from rubhpc.kernels.case_progress import FINISHED
+from rubhpc.integrate.periodic_motions.piecewise_motion import Unfollowed
 
 if TYPE_CHECKING:
-    from rubhpc.integrate.marches.collocation import CollocationMarch
+    from numpy.typing import NDArray
+
+    from rubhpc.integrate.periodic_motions.collocated_motion import FollowedMotion
+
+    Floats = NDArray[np.float64]
+
+MOST_RETURNS = 4  # revolutions back to the return that is taken, at most
+REPEATED = 1e-5  # of a motion: a smaller difference from a return is due to steps
+LOST = 1e-280  # a smaller displacement counts as zero
 
 
 class CarriedTangent:
-    """As `lyapunov.Neighbours`, from where a march stands that is needed no more."""
+    """As `lyapunov.Neighbours`, from where a motion begins."""
 
-    def __init__(self, march: CollocationMarch) -> None:
+    def __init__(self, motion: FollowedMotion) -> None:
         """Begin with a displacement without a special direction."""
         self.n_aligning, self.most_spans = N_ALIGNING, N_ALIGNING + N_MOST
-        self.within: list[float] = []
-        self._march, self._tick = march, 0
-        n, modes = march.bodies.stiffness.shape[0], march.modes
-        self._weight = np.repeat([abs(march.setup.spin), 1.0], n)
-        none = modes.coordinates(np.zeros(2 * n))
-        self._column = (modes.coordinates(np.cos(np.arange(2.0 * n)) / self._weight) - none)[:, np.newaxis]
-        self._scale()
+        self._motion = motion
+        motion.stand_at(motion.start, motion.states)
+        self._column = self._generic()
+        with suppress(Unfollowed):
+            self._begin_at_return()
+
+    def _begin_at_return(self) -> None:
+        """Begin some revolutions later, with the difference from the nearest return, unless that is none.
+
+        The difference of a torus from an earlier return lies along the torus, and that of a chaotic motion
+        has lost what decays. A displacement without a special direction takes twice as long to align.
+        """
+        motion = self._motion
+        later = motion.follow(motion.start, motion.states, MOST_RETURNS)
+        end = later[-1].end
+        apart = [end - before for before in (motion.start, *(one.end for one in later[:-1]))]
+        nearest = min(apart, key=motion.size)
+        if motion.size(nearest) > REPEATED * motion.size(end):
+            motion.stand_at(end, later[-1].states)
+            self._column = nearest[:, np.newaxis] / motion.size(nearest)
 
     def part(self, n_revolution: int) -> float | None:
         """Continue; return the growth of the logarithm of the displacement, or None at an end."""
-        clock = self._march.clock
-        self._tick += n_revolution * clock.samples_per_revolution << clock.sample_level
-        outcome, trail = self._march.carry(self._tick, self._column, 0)
-        if outcome != FINISHED:
+        try:
+            self._column = self._motion.go_on(self._column, n_revolution)
+        except Unfollowed:
             return None
-        self._column = trail.columns
-        size = self._scale()
-        return math.log(size) if size > 0.0 else -math.inf
-
-    def _scale(self) -> float:
-        """Make the displacement one of unit size; returns what it was."""
-        size = float(np.linalg.norm(self._weight * (self._march.modes.motion @ self._column)[:, 0]))
-        if size > 0.0:
+        size = max(self._motion.size(self._column[:, 0]), LOST)
+        if size > LOST:
             self._column /= size
-        return size
+        else:
+            self._column = self._generic()
+        return math.log(size)
+
+    def _generic(self) -> Floats:
+        """A displacement (2 n, 1) of size 1, without a special direction."""
+        even: Floats = np.cos(np.arange(2.0 * self._motion.n)) / np.sqrt(self._motion.energy)
+        return even[:, np.newaxis] / self._motion.size(even)

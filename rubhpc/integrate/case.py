@@ -4,32 +4,26 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rubhpc.integrate.carried_tangent import CarriedTangent
-from rubhpc.integrate.compilation import (
-    COLLOCATION,
-    COMMON,
-    NEIGHBOURS,
-    PERIODIC,
-    RUN_UPS,
-    seconds_compiling,
-)
+from rubhpc.integrate.compilation import COLLOCATION, COMMON, PERIODIC, RUN_UPS, seconds_compiling
 from rubhpc.integrate.lyapunov import Growth, Marches
-from rubhpc.integrate.marched_record import Marched, march_record, repeat_period
+from rubhpc.integrate.marched_record import march_record
 from rubhpc.integrate.marches.central_difference import CentralDifferenceMarch
 from rubhpc.integrate.marches.collocation import CollocationMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.marches.met_modes import NoClosedForm
+from rubhpc.integrate.marches.modal import ModalMarch
 from rubhpc.integrate.measuring.divergence import diverged_record
 from rubhpc.integrate.measuring.measures import measures_of
 from rubhpc.integrate.measuring.monitors import carrier_displacement, monitored
 from rubhpc.integrate.measuring.orbit_measures import period
-from rubhpc.integrate.measuring.regimes import LASTING, LEAST_REVOLUTIONS, by_growth, regime, undecided
+from rubhpc.integrate.measuring.regimes import LASTING, by_growth, regime, undecided
 from rubhpc.integrate.measuring.rub_in_bores import rub_measures
 from rubhpc.integrate.measuring.samples import (
     add_sag,
@@ -43,16 +37,13 @@ from rubhpc.integrate.overlaps import with_overlap
 from rubhpc.integrate.periodic_motions.collocated_motion import followed_motion
 from rubhpc.integrate.periodic_motions.direct import pass_directly
 from rubhpc.integrate.periodic_motions.lyapunov_spectrum import spectrum_of
-from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.periodic_motions.proof import Solver
 from rubhpc.integrate.periodic_motions.solved_motion import SolvedMotion, solved_motions
 from rubhpc.integrate.record import Record, State
 from rubhpc.integrate.releases import Through, record_through
 from rubhpc.integrate.scheme import Scheme
 from rubhpc.integrate.start import fit_to_gaps, start_of
-from rubhpc.integrate.tangent_motion import TangentMotion
 from rubhpc.integrate.transient import pass_revolutions, pass_transient
-from rubhpc.kernels.trail import BROKEN
 from rubhpc.schema import DONE, REGIME, SECTION_NAMES, bore_variables, lyapunov_variables
 from rubhpc.spectra import amplitude_spectrum
 from rubhpc.study.initial import Initial
@@ -63,18 +54,15 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.lyapunov import Neighbours
     from rubhpc.integrate.marches.march import March
     from rubhpc.integrate.measuring.measures import Judge
     from rubhpc.integrate.measuring.regimes import Verdict
-    from rubhpc.integrate.periodic_motions.collocated_motion import CollocatedMotion
+    from rubhpc.integrate.periodic_motions.collocated_motion import FollowedMotion
     from rubhpc.integrate.setup import Setup
     from rubhpc.kernels.accumulators import Samples
-    from rubhpc.kernels.trail import Trail
     from rubhpc.study.study import Recording
 
     Floats = NDArray[np.float64]
-
 
 MARCHES: dict[Scheme, Callable[..., March]] = {
     Scheme.EVENT_DRIVEN: EventDrivenMarch,
@@ -82,7 +70,43 @@ MARCHES: dict[Scheme, Callable[..., March]] = {
     Scheme.CENTRAL_DIFFERENCE: CentralDifferenceMarch,
 }
 
-_spare: list[Trail] = []  # arrays of the last case, unless another one uses them
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """A case and what integrates it.
+
+    Attributes
+    ----------
+    look : callable
+        Called with a march between its kernel calls, if any.
+    is_judged : bool
+        Whether its regime is found; else it is undecided.
+    """
+
+    setup: Setup
+    scheme: Scheme
+    clearance: float  # m
+    friction: float
+    recording: Recording
+    look: Callable[[March], None] | None = None
+    is_judged: bool = True
+
+    def march(self, state: State, setup: Setup | None = None) -> March:
+        """Start a march from a state, of this set-up or of another one."""
+
+        def check() -> None:
+            assert self.look is not None
+            self.look(march)
+
+        march: March = MARCHES[self.scheme](
+            setup or self.setup, self.clearance, self.friction, state, check if self.look else None
+        )
+        return march
+
+    def motion(self, initial: State | None, march: March | None = None, **options: float) -> FollowedMotion:
+        """Make what follows its motions, from a state or from where a march stands that is needed no more."""
+        make = followed_motion(self.scheme, **options)
+        return make(self.setup, self.clearance, self.friction, initial, march)
 
 
 def run_case(
@@ -124,33 +148,34 @@ def run_case(
     else:
         state = start_of(initial or Initial(), setup, clearance)
 
-    def starter(scheme: Scheme) -> Callable[..., March]:
-        def start(state: State, setup: Setup = setup) -> March:
-            def look() -> None:
-                assert check is not None
-                revolution = march.sample / setup.samples_per_revolution
-                note((recording.longest_transient + revolution) / n_whole)
-                check()
-                say(reached(revolution))
+    def look(march: March) -> None:
+        assert check is not None
+        revolution = march.sample / setup.samples_per_revolution
+        note((recording.longest_transient + revolution) / n_whole)
+        check()
+        say(reached(revolution))
 
-            march = MARCHES[scheme](setup, clearance, friction, state, None if check is None else look)
-            return march
-
-        return start
-
-    scheme = setup.scheme
+    case = Case(
+        setup=setup,
+        scheme=setup.scheme,
+        clearance=clearance,
+        friction=friction,
+        recording=recording,
+        look=None if check is None else look,
+        is_judged=is_judged,
+    )
     try:
-        record = _integrate(starter(scheme), state, setup, clearance, friction, recording, is_judged)
+        record = _integrate(case, state)
     except NoClosedForm:
         # Contacts that chatter, or too many sets of them.
-        scheme = Scheme.COLLOCATION
-        record = _integrate(starter(scheme), state, setup, clearance, friction, recording, is_judged)
+        case = replace(case, scheme=Scheme.COLLOCATION)
+        record = _integrate(case, state)
         record.measures["left_closed_form"] = 1
-    record.measures["scheme"] = scheme.flag
+    record.measures["scheme"] = case.scheme.flag
     record.measures["modal_error"] = setup.modal_error if isinstance(setup, ModalSetup) else math.nan
     if isinstance(setup, ModalSetup) and np.any(record.measures["contact_fraction"] != 0.0):
         record = replace(record, advice=setup.modes_missing)  # without contact no mode is excited
-    if scheme is not Scheme.EVENT_DRIVEN:
+    if case.scheme is not Scheme.EVENT_DRIVEN:
         record = replace(record, final=with_overlap(record.final, setup, clearance))
     record.measures["wall_time"] = time.perf_counter() - seconds_compiling() - began
     return record
@@ -167,10 +192,8 @@ def kernel_sets(setup: Setup, *, changes_speed: bool = False) -> set[str]:
     """Return the sets of kernels that a case of this set-up may need (`compilation`)."""
     if not isinstance(setup, ModalSetup):
         return {COMMON}
-    sets = {COMMON, RUN_UPS} if changes_speed else {COMMON, NEIGHBOURS}
-    if setup.scheme is Scheme.COLLOCATION:
-        return sets | {COLLOCATION}
-    return sets | {PERIODIC}
+    sets = {COMMON, RUN_UPS} if changes_speed else {COMMON}
+    return sets | {COLLOCATION if setup.scheme is Scheme.COLLOCATION else PERIODIC}
 
 
 def compile_kernels(
@@ -180,77 +203,60 @@ def compile_kernels(
     friction: float,
     recording: Recording,
     check: Callable[[], None] | None = None,
-    all_sets: bool = False,
 ) -> None:
     """Compile the kernels that every case of this set-up calls, on two revolutions.
 
-    Those of collocation, where only some cases need it, are compiled when a case first calls them; so are
-    those for neighbouring motions, unless `all_sets`.
+    Those of collocation, where only some cases of closed form need it, are compiled when one calls them.
     """
     short = replace(recording, transient=1, transient_limit=None, transient_tolerance=None, revolutions=1)
     record = run_case(setup, clearance=clearance, friction=friction, recording=short, check=check)
-    if isinstance(setup, ModalSetup) and setup.scheme is Scheme.EVENT_DRIVEN and record.status == DONE:
-        Solver(setup, clearance, friction, record.final)(1)
-        if all_sets:
-            start = partial(EventDrivenMarch, setup, clearance, friction, check=check)
-            TangentMotion(start, record.final, setup, recording).part(1)
+    if isinstance(setup, ModalSetup) and record.status == DONE:
+        case = Case(
+            setup=setup, scheme=setup.scheme, clearance=clearance, friction=friction, recording=recording
+        )
+        Solver(case.motion, record.final)(1)
 
 
-def _integrate(
-    start: Callable[..., March],
-    initial: State,
-    setup: Setup,
-    clearance: float,
-    friction: float,
-    recording: Recording,
-    is_judged: bool,
-) -> Record:
+def _integrate(case: Case, initial: State) -> Record:
     """March through transient and record, then measure."""
-    march = start(initial)
+    setup, recording = case.setup, case.recording
+    march = case.march(initial)
     motion: SolvedMotion | None = None  # that the transient ends on
-    n_step = n_left = 0
+    n_step = 0
     per_revolution = setup.samples_per_revolution
-    settings = {"spin_speed": setup.spin, "clearance": clearance}
-    begin = partial(followed_motion(setup), cast("ModalSetup", setup), clearance, friction)
-    if recording.is_transient_direct and isinstance(march, EventDrivenMarch):
-        motions = solved_motions(march.setup, (clearance, friction, recording))
-        followed = partial(PiecewiseMotion, march.setup, clearance, friction)
-        march, reason, n_transient, n_step, motion = pass_directly(march, followed, recording, motions)
+    settings = {"spin_speed": setup.spin, "clearance": case.clearance}
+    if recording.is_transient_direct and isinstance(march, ModalMarch):
+        motions = solved_motions(march.setup, (case.clearance, case.friction, recording))
+        march, reason, n_transient, n_step, motion = pass_directly(
+            march, partial(case.motion, None), recording, motions
+        )
         if motion is not None and motion.record is not None:
-            record, n_own_step, n_own_left = motion.record
-            return _counted(record.copied(), n_transient, n_step + n_own_step, march.n_left + n_own_left)
+            record, n_own_step = motion.record
+            return _counted(record.copied(), n_transient, n_step + n_own_step)
     else:
         reason, n_transient = pass_transient(march, recording)
-    marched: Marched | None = None
-    trail: Trail | None = None
     through: Through | None = None
-    n_step_before, n_left_before = n_step, march.n_left
+    n_step_before = n_step
     if reason is not None:  # the record shows the way to divergence
-        n_step, n_left = n_step + march.n_step, march.n_left
+        n_step += march.n_step
         ended = n_transient + march.sample // per_revolution + 1
-        march, n_transient = start(initial), max(0, ended - recording.revolutions)
+        march, n_transient = case.march(initial), max(0, ended - recording.revolutions)
         is_short = pass_revolutions(march, recording, n_transient) is not None
         marched = march_record(march, setup, 0 if is_short else recording.revolutions)
-    elif motion is not None:
-        assert isinstance(march, EventDrivenMarch)
-        marched, n_lost = repeat_period(march, motion.period, recording.revolutions)
-        n_step += n_lost
-        motion = motion if marched is not None else None
-    if marched is None:
-        trail = trail_of(march, recording) if is_judged else None
+    else:
         if isinstance(setup, ModalSetup) and setup.release is not None:
-            through = record_through(march, setup, recording.revolutions, start)
+            through = record_through(march, setup, recording.revolutions, case.march)
             marched, march, n_step = through.marched, through.march, n_step + through.n_step
         else:
             marched = march_record(march, setup, recording.revolutions)
         reason = marched.reason
-    n_step, n_left = n_step + march.n_step, n_left + march.n_left
+    n_step += march.n_step
     samples, accumulator, final = marched.samples, marched.accumulator, marched.final
-    last_setup, n_before = setup, 0
+    last, n_before = case, 0
     if through is None:
         add_sag(samples, accumulator, setup.model)
     else:
-        last_setup, n_before = through.setup, through.n_sample
+        last, n_before = replace(case, setup=through.setup), through.n_sample
     if reason is not None:
         n_kept = samples_within(samples, n_before + march.sample, setup.displacement_limit)
         revolution = n_transient + min(n_kept // per_revolution + 1, recording.revolutions)
@@ -266,14 +272,7 @@ def _integrate(
     else:
         signals = by_name(samples.whole, setup.model)
         turn = 2.0 * math.pi / abs(setup.spin)
-        judge: Judge
-        if motion is not None:
-            judge = motion.judge
-        elif is_judged:
-            again = partial(start, setup=last_setup)
-            judge = judge_of(march, again, last_setup, clearance, friction, recording, final, trail)
-        else:
-            judge = undecided
+        n_event = 2.0 * float(accumulator.n_contact.sum()) / recording.revolutions
         record = Record(
             status=DONE,
             samples_per_revolution=per_revolution,
@@ -289,7 +288,7 @@ def _integrate(
                 model=setup.model,
                 spin=setup.spin,
                 samples_per_revolution=per_revolution,
-                judge=judge,
+                judge=judge_of(last, march, final, n_event) if motion is None else motion.judge,
             )
             | monitored(samples, accumulator, setup.model, is_round=setup.is_updated)
             | {"carrier_displacement": carrier_displacement(samples, setup.model)}
@@ -301,18 +300,17 @@ def _integrate(
             n_exponent=recording.lyapunov,
         )
         if recording.lyapunov:
-            record.measures.update(exponents_of(march, begin, final, recording.lyapunov))
+            record.measures.update(exponents_of(last, march, final))
         if "waveform" not in recording.keep:
             record.signals.clear()
-        give_back(march, trail)
     if motion is not None:
-        motion.record = record.copied(), n_step - n_step_before, n_left - n_left_before
-    return _counted(record, n_transient, n_step, n_left)
+        motion.record = record.copied(), n_step - n_step_before
+    return _counted(record, n_transient, n_step)
 
 
-def _counted(record: Record, n_transient: int, n_step: int, n_left: int) -> Record:
+def _counted(record: Record, n_transient: int, n_step: int) -> Record:
     """Note what it took to come to a record and through it."""
-    record.measures.update(transient_revolutions=n_transient, steps=n_step, left_closed_form=n_left)
+    record.measures.update(transient_revolutions=n_transient, steps=n_step, left_closed_form=0)
     return record
 
 
@@ -323,30 +321,30 @@ def _spectra(samples: Samples, model: Model) -> dict[str, Floats]:
     return {f"spectrum_{name}": spectrum for name, spectrum in spectra.items() if name not in unasked}
 
 
-def exponents_of(
-    march: March, begin: Callable[[State], PiecewiseMotion | CollocatedMotion], final: State, n_exponent: int
-) -> dict[str, float]:
-    """Lyapunov exponents from where a march has ended; NaN where it has no closed form."""
-    if isinstance(march, EventDrivenMarch | CollocationMarch):
-        found = spectrum_of(partial(begin, final), n_exponent)
-        largest = found["lyapunov_1"]
-        return found if math.isnan(largest) else found | {"lyapunov_exponent": largest}
-    return dict.fromkeys(lyapunov_variables(n_exponent), math.nan)
+def exponents_of(case: Case, march: March, final: State) -> dict[str, float]:
+    """Lyapunov exponents from where a march has ended; NaN where it has no tangent."""
+    n_exponent = case.recording.lyapunov
+    if not isinstance(march, ModalMarch):
+        return dict.fromkeys(lyapunov_variables(n_exponent), math.nan)
+    found = spectrum_of(partial(case.motion, final), n_exponent)
+    largest = found["lyapunov_1"]
+    return found if math.isnan(largest) else found | {"lyapunov_exponent": largest}
 
 
-def judge_of(
-    march: March,
-    start: Callable[[State], March],
-    setup: Setup,
-    clearance: float,
-    friction: float,
-    recording: Recording,
-    final: State,
-    trail: Trail | None,
-) -> Judge:
-    """What judges a simulated record: its orbit, neighbouring motions and periodic ones."""
-    solver = solver_of(march, setup, clearance, friction, final)
-    growth = Growth(lambda: neighbours_of(march, trail, start, final, setup, recording))
+def judge_of(case: Case, march: March, final: State, n_event: float) -> Judge:
+    """What judges a simulated record: its orbit, neighbouring motions and periodic ones.
+
+    A march of the case that is needed no more is started again; `n_event` are the events in a revolution.
+    """
+    if not case.is_judged:
+        return undecided
+    solver = Solver(case.motion, final, march) if isinstance(march, ModalMarch) else None
+
+    def growth_from(state: State) -> Growth:
+        if isinstance(march, ModalMarch):
+            accuracy = march.setup.accuracy
+            return Growth(lambda: CarriedTangent(case.motion(state, march, accuracy=accuracy)))
+        return Growth(lambda: Marches(case.march, state, case.setup, case.recording))
 
     def lasts(exponent: float) -> bool:
         """Whether chaos was followed to the end of what is followed, does not drift and is chaos there."""
@@ -355,10 +353,8 @@ def judge_of(
         energy, end = solver.followed
         if not is_steady(energy):
             return False
-        if trail is not None:
-            trail.n_event[0] = BROKEN  # its room alone is used again
         try:
-            flag, later = by_growth(Growth(lambda: neighbours_of(march, trail, start, end, setup, recording)))
+            flag, later = by_growth(growth_from(end))
         except NoClosedForm:
             return False
         return flag == REGIME.index("chaotic") and exponent + later >= 2.0 * LASTING
@@ -370,73 +366,11 @@ def judge_of(
             per_revolution,
             period=period(vertical, horizontal, per_revolution),
             is_contact=is_contact,
-            growth=growth,
-            within=growth.within,
+            growth=growth_from(final),
             solve=solver,
             later=solver.later if solver is not None else None,
             lasts=lasts if solver is not None else None,
-            n_event=trail.n_event[0] / recording.revolutions if trail is not None else 0.0,
+            n_event=n_event,
         )
 
     return judge
-
-
-def solver_of(
-    march: March,
-    setup: Setup,
-    clearance: float,
-    friction: float,
-    final: State,
-) -> Solver | None:
-    """Solver for periodic motions near the end of a march; None where it has no closed form."""
-    if isinstance(march, EventDrivenMarch | CollocationMarch) and isinstance(setup, ModalSetup):
-        return Solver(setup, clearance, friction, final, march)
-    return None
-
-
-def trail_of(march: March, recording: Recording) -> Trail | None:
-    """Record the events of a record where its tangent may be propagated along them."""
-    if isinstance(march, EventDrivenMarch) and recording.revolutions >= LEAST_REVOLUTIONS:
-        trail = _kept(march) or march.new_trail()
-        march.keep(trail)
-        return trail
-    return None
-
-
-def give_back(march: March, trail: Trail | None) -> None:
-    """Keep the arrays of a trail for the next case, when nothing reads or writes them any more.
-
-    The system clears new memory page by page, which takes longer than following the tangent.
-    """
-    if trail is not None:
-        cast("EventDrivenMarch", march).keep(None)
-        _spare[:] = [trail]
-
-
-def _kept(march: EventDrivenMarch) -> Trail | None:
-    """Kept arrays, if they fit a march."""
-    try:
-        trail = _spare.pop()
-    except IndexError:
-        return None
-    width = trail.begun.shape[2], trail.given.shape[1]
-    return trail if width == march.width else None
-
-
-def neighbours_of(
-    march: March,
-    trail: Trail | None,
-    start: Callable[[State], March],
-    final: State,
-    setup: Setup,
-    recording: Recording,
-) -> Neighbours:
-    """A motion next to the one from the end of a march."""
-    if isinstance(march, EventDrivenMarch):
-        return TangentMotion(
-            cast("Callable[[State], EventDrivenMarch]", start), final, setup, recording, trail, march
-        )
-    if isinstance(march, CollocationMarch):
-        march.start_again(final)
-        return CarriedTangent(march)
-    return Marches(start, final, setup, recording)

@@ -39,13 +39,10 @@ class Neighbours(Protocol):
     n_aligning, most_spans : int
         Spans in which their displacement turns into the direction of largest growth, and most spans to
         follow, including these.
-    within : list of float
-        Growth per revolution in the spans of the record, where known.
     """
 
     n_aligning: int
     most_spans: int
-    within: list[float]
 
     def part(self, n_revolution: int) -> float | None:
         """Continue both; return the growth of the logarithm of their distance, or None at an end.
@@ -75,10 +72,6 @@ class Growth:
     def _neighbours(self) -> Neighbours:
         return self._begin()
 
-    def within(self) -> list[float]:
-        """Return the spans of the record, where known."""
-        return self._neighbours.within
-
     def __iter__(self) -> Iterator[float]:
         """Yield span by span."""
         neighbours = self._neighbours
@@ -106,7 +99,6 @@ class Marches:
     ) -> None:
         """Start at `state` and next to it."""
         self.n_aligning = N_ALIGNING
-        self.within: list[float] = []
         self.most_spans = N_ALIGNING + N_ALL  # of small steps; more may take minutes
         self._start, self._recording = start, recording
         self._model, self._spin = setup.model, setup.spin

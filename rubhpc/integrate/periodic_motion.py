@@ -14,7 +14,7 @@ from rubhpc.errors import InputError, NoPeriodicMotion
 from rubhpc.integrate.case import MARCHES, run_case
 from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.modal_setup import ModalSetup
-from rubhpc.integrate.periodic_motions.collocated_motion import CollocatedMotion, followed_motion
+from rubhpc.integrate.periodic_motions.collocated_motion import followed_motion
 from rubhpc.integrate.periodic_motions.revolution import least_of
 from rubhpc.integrate.periodic_motions.shooting import NotConverged, Orbit, shoot
 from rubhpc.integrate.record import Record, State
@@ -24,7 +24,8 @@ from rubhpc.schema import REGIME
 from rubhpc.spectra import amplitude_spectrum
 
 if TYPE_CHECKING:
-    from rubhpc.integrate.periodic_motions.piecewise_motion import Change, PiecewiseMotion
+    from rubhpc.integrate.periodic_motions.collocated_motion import FollowedMotion
+    from rubhpc.integrate.periodic_motions.piecewise_motion import Change
     from rubhpc.integrate.setup import Setup
     from rubhpc.study.initial import Initial
     from rubhpc.study.tables import Recording
@@ -173,13 +174,13 @@ def _search(
     period: int,
     recording: Recording,
     initial: State | Initial,
-) -> tuple[PiecewiseMotion | CollocatedMotion, Orbit]:
+) -> tuple[FollowedMotion, Orbit]:
     """Shoot from the state, then from the end of a simulation."""
     if isinstance(initial, State):
         state, first = fit_to_gaps(initial, setup, clearance), 0
     else:
         state, first = start_of(initial, setup, clearance), recording.longest_transient
-    unstable: tuple[PiecewiseMotion | CollocatedMotion, Orbit] | None = None
+    unstable: tuple[FollowedMotion, Orbit] | None = None
     reason = ""
     for span in (first, *SPANS):
         if span:
@@ -189,7 +190,7 @@ def _search(
                 reason = ended
                 break
             state = fit_to_gaps(march.final(), setup, clearance)
-        piecewise = followed_motion(setup)(setup, clearance, friction, state)
+        piecewise = followed_motion(setup.scheme)(setup, clearance, friction, state)
         try:
             orbit = shoot(piecewise, piecewise.start, piecewise.states, period)
         except NotConverged as problem:
@@ -247,7 +248,7 @@ def record_of_period(
     )
 
 
-def _events(piecewise: PiecewiseMotion | CollocatedMotion, orbit: Orbit) -> list[ContactEvent]:
+def _events(piecewise: FollowedMotion, orbit: Orbit) -> list[ContactEvent]:
     """Events of a period in the order of time."""
     found = []
     for i_revolution, revolution in enumerate(orbit.revolutions):

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rubhpc.integrate.marched_record import Marched, Part, march_record, repeated_sums
+from rubhpc.integrate.marched_record import Marched, joined_sums, march_record
 from rubhpc.integrate.measuring.samples import add_sag, empty_samples, following_accumulator
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def record_through(
     march: March, setup: ModalSetup, n_revolution: int, again: Callable[[State, ModalSetup], March]
 ) -> Through:
     """Record so many revolutions from where a march stands; where bearings let go, begin `again`."""
-    parts: list[Part] = []
+    parts: list[Marched] = []
     gained, done, n_step, turn = 0.0, 0, 0, setup.interval * setup.samples_per_revolution
     begins = turn * np.arange(n_revolution + 1, dtype=np.float64)
     while True:
@@ -40,7 +40,7 @@ def record_through(
         sums = following_accumulator(parts[-1].accumulator, turn * done) if parts else None
         marched = march_record(march, setup, n, sums)
         add_sag(marched.samples, marched.accumulator, setup.model)
-        parts.append(Part(marched.samples, marched.accumulator, 1))
+        parts.append(marched)
         gained += marched.energy[1] - marched.energy[0]
         if marched.reason is not None or release is None or done + n == n_revolution:
             break
@@ -51,5 +51,11 @@ def record_through(
     samples = empty_samples(march.n_place, n_revolution * n_sample, model.n_probe, model.n_push)
     whole = np.concatenate([part.samples.whole for part in parts], axis=1)
     samples.whole[:, : whole.shape[1]] = whole
-    taken = Marched(samples, repeated_sums(parts), (0.0, gained), marched.final, marched.reason)
+    taken = Marched(
+        samples,
+        joined_sums([part.accumulator for part in parts]),
+        (0.0, gained),
+        marched.final,
+        marched.reason,
+    )
     return Through(taken, march, setup, n_step, done * n_sample)

@@ -18,9 +18,8 @@ from rubhpc.kernels.case_progress import (
 from rubhpc.kernels.contact_modes import FORCED_LEVEL, ModeTables, Reduced
 from rubhpc.kernels.event_steps import enter_wanted, leave_mode, record_event, record_touch
 from rubhpc.kernels.measuring import begin_contact, begin_span
-from rubhpc.kernels.mode_change import EventWork, change_contacts, product
+from rubhpc.kernels.mode_change import EventWork, change_contacts
 from rubhpc.kernels.sampling import Measured, Recorder  # noqa: TC001 - part of a kernel's signature
-from rubhpc.kernels.trail import Trail, note_after, note_event, note_piece
 
 Floats = NDArray[np.float64]
 
@@ -36,7 +35,6 @@ def begin_mode(
     progress: Progress,
     coordinates: Coordinates,
     recorder: Recorder,
-    trail: Trail,
 ) -> bool:
     """Enter the contact mode wanted, if any, with the reduced motion, and begin to measure it.
 
@@ -45,7 +43,6 @@ def begin_mode(
     is_entered, z = progress.wanted < 0, coordinates.z
     if not is_entered and enter_wanted(tables, reduced, clock, progress, coordinates.motion, z):
         is_entered = True
-        note_piece(trail, tables.mask[progress.mode], z)
     if is_entered and is_recorded:
         if progress.energy_from < 0:
             begin_span(z, progress, recorder)
@@ -76,7 +73,6 @@ def take_event(
     samples, accumulator = measured.samples, measured.accumulator
     if not leave_mode(tables, reduced, clock, is_recorded, progress, coordinates, work.impulse, measured):
         return DIVERGED
-    note_event(work.trail, progress.tick, crossing)
     cosine, sine = shaft_turn(clock, progress.tick)
     moment = (1 << FORCED_LEVEL) * clock.tick
     progress.wanted = change_contacts(
@@ -84,10 +80,6 @@ def take_event(
     )
     if progress.wanted < 0 or progress.n_event > MOST_EVENTS:
         return CONTACT_UNSOLVED
-    if work.trail.tick.size > 0:
-        for i in range(work.speed.size):
-            work.speed[i] = product(reduced.gap_jacobian[i], motion[motion.size // 2 :])
-        note_after(work.trail, work.speed, work.given)
     if is_recorded:
         for i in range(reduced.radius.size):
             record_event(clock, progress, work.impulse, i, samples, accumulator)

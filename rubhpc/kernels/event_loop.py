@@ -113,9 +113,7 @@ def advance(
     proved = progress.tick  # up to which no event can happen
     while True:
         if progress.wanted >= 0 or not is_begun:
-            if not begin_mode(
-                tables, reduced, clock, is_recorded, progress, coordinates, measured.recorder, work.trail
-            ):
+            if not begin_mode(tables, reduced, clock, is_recorded, progress, coordinates, measured.recorder):
                 return MODE_WANTED
             is_begun = True
         is_sample = is_recorded and progress.tick == progress.next_sample << clock.sample_level

@@ -17,7 +17,6 @@ from rubhpc.kernels.accumulators import (
 )
 from rubhpc.kernels.complementarity import UNSOLVED, residual_of, solve_active, solve_complementarity
 from rubhpc.kernels.contact_modes import Reduced  # noqa: TC001 - part of a kernel's signature
-from rubhpc.kernels.trail import Trail, no_trail
 
 Floats = NDArray[np.float64]
 
@@ -37,11 +36,10 @@ class EventWork(Struct):
     impulse: Floats  # (q,), accumulated before the event, N s
     active: NDArray[np.bool_]  # (q,)
     elimination: Floats  # (q, q + 1)
-    trail: Trail  # of the motion
 
 
 def event_work(q: int) -> EventWork:
-    """Work space of the events of q pairs, without a trail."""
+    """Work space of the events of q pairs."""
     return EventWork(
         force=np.zeros(q),
         given=np.zeros(q),
@@ -49,7 +47,6 @@ def event_work(q: int) -> EventWork:
         impulse=np.zeros(q),
         active=np.zeros(q, dtype=np.bool_),
         elimination=np.zeros((q, q + 1)),
-        trail=no_trail(),
     )
 
 

@@ -26,23 +26,18 @@ class _Enough(BaseException):  # no error: it ends a case, whatever it is doing
     pass
 
 
-def warm_up(
-    grid: CaseGrid, index: Sequence[int], check: Callable[[], None], *, all_sets: bool = False
-) -> None:
+def warm_up(grid: CaseGrid, index: Sequence[int], check: Callable[[], None]) -> None:
     """Do so for each law of contact of the study, elsewhere as at an index; see `load_kernels`."""
     cases = grid.with_each_law(index)
     setups = [set_up_for_kernels(grid.study, case) for case in cases]
     changes = cases[0].speed_law is not None
     expect_sets(set().union(*(kernel_sets(setup, changes_speed=changes) for setup in setups)))
     for case in cases:
-        load_kernels(grid, case, check, all_sets=all_sets)
+        load_kernels(grid, case, check)
 
 
-def load_kernels(grid: CaseGrid, case: Case, check: Callable[[], None], *, all_sets: bool = False) -> None:
-    """Compile or load the kernels of a case's law of contact, on its beginning.
-
-    Those that only some cases need, for neighbouring motions, are compiled with `all_sets` alone.
-    """
+def load_kernels(grid: CaseGrid, case: Case, check: Callable[[], None]) -> None:
+    """Compile or load the kernels of a case's law of contact, on its beginning."""
     study = grid.study
     if case.speed_law is None and study.branch is None:
         compile_kernels(
@@ -51,7 +46,6 @@ def load_kernels(grid: CaseGrid, case: Case, check: Callable[[], None], *, all_s
             friction=case.friction,
             recording=study.recording,
             check=check,
-            all_sets=all_sets,
         )
         return
     n_check = iter(range(WARM))

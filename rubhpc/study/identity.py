@@ -20,7 +20,7 @@ from rubhpc.study.axes import (
 if TYPE_CHECKING:
     from rubhpc.study.study import Study
 
-PHYSICS = 32  # version of the physics: raised whenever a study gives other results than before
+PHYSICS = 33  # version of the physics: raised whenever a study gives other results than before
 # Versions of what only some studies take, raised in place of PHYSICS and added to it for these.
 MODAL = 8  # method = "modal": modes kept, resolution of events, and last bits of multipliers and exponents
 DIRECT = 10  # transient = "direct"

@@ -20,7 +20,7 @@ SOLUTION = 0.005  # s, with multipliers and record, from a state near by; tables
 POINT = 0.010  # s, of a branch, its multipliers and events
 # Speed ratio, clearance ratio, friction, and how many times as fast as "auto" the direct way is to be, where
 # the rotor is damped by 0.1 % and by 1 %. 20 times were asked: they are held wherever they are met.
-LIGHT = ((0.9, 0.523, 0.3, 18.0, 2.5), (1.3, 0.968, 0.269, 20.0, 3.0), (1.6, 0.74, 0.33, 20.0, 3.5),
+LIGHT = ((0.9, 0.523, 0.3, 10.0, 2.5), (1.3, 0.968, 0.269, 20.0, 3.0), (1.6, 0.74, 0.33, 20.0, 3.5),
          (3.0, 0.5, 0.2, 20.0, 4.0))  # fmt: skip
 
 

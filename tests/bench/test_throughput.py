@@ -13,9 +13,9 @@ from rivals import run as run_rival
 
 import rubhpc
 from rubhpc.integrate import case as case_module
-from rubhpc.integrate import tangent_motion
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.marches import event_driven as event_driven_march
+from rubhpc.integrate.periodic_motions import saltation
 from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import with_keys
 from rubhpc.study.study import Integrator, Recording
@@ -134,7 +134,7 @@ def test_whole_study_with_little_around_the_kernel(benchmark, capsys, tmp_path, 
     small = replace(study, recording=Recording(transient=1, revolutions=1, keep=()))
     rubhpc.run(replace(small, output=tmp_path / "warm.zarr"), quiet=True)  # imports and compiles
     monkeypatch.setattr(event_driven_march, "advance", watched(event_driven_march.advance, "kernel"))
-    monkeypatch.setattr(tangent_motion, "carry_along", watched(tangent_motion.carry_along, "kernel"))
+    monkeypatch.setattr(saltation, "carry_pieces", watched(saltation.carry_pieces, "kernel"))
     monkeypatch.setattr(case_module, "amplitude_spectrum", watched(case_module.amplitude_spectrum, "FFT"))
     began = time.process_time()
     summary = benchmark.pedantic(lambda: rubhpc.run(study, quiet=True), rounds=1)

@@ -14,28 +14,27 @@ from rubhpc.integrate import compilation
 
 def test_each_part_is_announced_once(monkeypatch):
     monkeypatch.setattr(compilation, "_announced", [])
-    monkeypatch.setattr(compilation, "_expected", {compilation.NEIGHBOURS, compilation.COLLOCATION})
+    monkeypatch.setattr(compilation, "_expected", {compilation.PERIODIC, compilation.COLLOCATION})
     listener, texts = compilation.compilation, []
     before = listener.announce
     with compilation.announced_by(texts.append):
-        for name in (*2 * ("enter_with", "advance", "carry_along"), "advance_by_collocation"):
+        for name in (*2 * ("enter_with", "advance", "carry_pieces"), "advance_by_collocation"):
             listener.announce_set_of(name)
     assert listener.announce is before
     once = "once after an installation:"
     assert texts == [
         f"compiling kernels, {once} about 10 s on a free core",
-        f"compiling kernels for neighbouring motions, which distinguish chaos from order, {once} "
-        "set 1 of at most 2, about 10 s on a free core",
+        f"compiling kernels for periodic motions, {once} set 1 of at most 2, about 10 s on a free core",
         f"compiling kernels for curved gaps and any law, {once} set 2 of at most 2, "
         "about 15 s on a free core",
     ]
 
 
 def test_parts_are_names_of_kernels():
-    from rubhpc.kernels import linear_theory, piece_loop, revolutions, shooting, tangent
+    from rubhpc.kernels import piece_loop, revolutions, small_changes
     from rubhpc.kernels.collocation import march
 
-    modules = revolutions, shooting, linear_theory, tangent, march, piece_loop
+    modules = revolutions, small_changes, march, piece_loop
     kernels = {name for module in modules for name in vars(module)}
     assert all(name in kernels for name in compilation._SETS)
 
@@ -61,7 +60,6 @@ MAY_COMPILE = {
     "advance",
     "is_within",
     "normal_and_gap",
-    "search_period",
     "add_force",
 }
 FIRST_CASE = """

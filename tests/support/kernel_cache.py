@@ -56,22 +56,18 @@ def use(scheme: str) -> None:
 
 
 def _use_neighbours() -> None:
+    import numpy as np
     from closed_form import Contact, read_rig
 
-    from rubhpc.integrate.marches.event_driven import EventDrivenMarch
+    from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
     from rubhpc.integrate.record import State
     from rubhpc.integrate.setup import prepare
-    from rubhpc.integrate.tangent_motion import TangentMotion
-    from rubhpc.study.study import Integrator, Recording
+    from rubhpc.study.study import Integrator
 
     shared = {"contact": Contact(), "integrator": Integrator(), "samples_per_revolution": 32}
     setup = prepare(read_rig("mokhtar2017"), 150.0, **shared)
-    recording = Recording(samples_per_revolution=32)
-
-    def start(state: State) -> EventDrivenMarch:
-        return EventDrivenMarch(setup, 1e-4, 0.3, state, None)
-
-    TangentMotion(start, State.at_rest(setup.model), setup, recording).part(1)
+    motion = PiecewiseMotion(setup, 1e-4, 0.3, State.at_rest(setup.model))
+    motion.go_on(np.eye(2 * motion.n)[:, :1])
 
 
 def use_own_cache(worker: str) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from rubhpc.integrate.branches.branching import STEEP
 from rubhpc.integrate.branches.events import Event, crossings, tolerance_of
 from rubhpc.integrate.branches.weak_impact import DEPTH, weakly_impacting
-from rubhpc.integrate.periodic_motions.collocated_motion import code_of, states_of
+from rubhpc.integrate.marches.collocation import code_of, states_of
 from rubhpc.integrate.periodic_motions.revolution import least_of
 from rubhpc.integrate.periodic_motions.shooting import NotConverged
 from rubhpc.kernels.collocation.structures import FORWARD, OPEN

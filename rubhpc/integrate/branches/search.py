@@ -101,7 +101,7 @@ def simulated(
             if isinstance(initial, Initial)
             else fit_to_gaps(initial, setup, clearance)
         )
-        begin = partial(followed_motion(setup), setup, clearance, friction)
+        begin = partial(followed_motion(setup.scheme), setup, clearance, friction)
         march = begin(state).march
         if pass_revolutions(march, recording, recording.longest_transient) is not None:
             return None

@@ -43,7 +43,19 @@ if TYPE_CHECKING:
     from rubhpc.kernels.accumulators import Accumulator, Samples
 
 Floats = NDArray[np.float64]
+STATE_BITS = 2  # of a pair in the number of all states
 MOST_KEPT, ROOM = 64, 1 << 23  # matrices of each length of step where gaps are straight; bytes of all of them
+
+
+def code_of(states: NDArray[np.int64]) -> int:
+    """States of all pairs as one number."""
+    return sum((int(state) & 3) << STATE_BITS * i for i, state in enumerate(states))
+
+
+def states_of(code: int, q: int) -> NDArray[np.int64]:
+    """States (q,) of a number: open, sliding forward or backward, sticking."""
+    found = np.array([code >> STATE_BITS * i & 3 for i in range(q)])
+    return np.where(found == 3, -1, found)
 
 
 class Contacts(NamedTuple):
@@ -212,21 +224,10 @@ class CollocationMarch(ModalMarch):
         for least, last, is_so in zip(trail.least, lasts, (is_open, ~is_open), strict=True):
             np.copyto(least, last, where=is_constant & is_so & np.isinf(least))
 
-    def keep(self, trail: object) -> None:
-        """Nothing: events are kept where a tangent is carried."""
-
     def pass_sections(
         self, n_revolution: int, samples: Samples, accumulator: Accumulator
     ) -> tuple[Floats, str | None]:
-        """Go on by some revolutions without a record.
-
-        Returns
-        -------
-        (n_revolution, 2 n)
-            The motion at the end of each.
-        str or None
-            Why the case cannot go on.
-        """
+        """Go on by some revolutions without a record (`ModalMarch.pass_sections`)."""
         sections, per_revolution = (
             np.empty((n_revolution, self._motion.size)),
             self.clock.samples_per_revolution,
@@ -257,6 +258,11 @@ class CollocationMarch(ModalMarch):
     def states(self) -> NDArray[np.int64]:
         """State of each pair, (q,)."""
         return self._case.state.copy()
+
+    @property
+    def pair_states(self) -> int:
+        """States of all pairs as one number."""
+        return code_of(self._case.state)
 
     def motion(self) -> Floats:
         """Reduced displacements, then velocities (2 n,), at the sample reached."""

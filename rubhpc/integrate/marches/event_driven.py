@@ -17,7 +17,6 @@ from rubhpc.kernels.event_loop import advance
 from rubhpc.kernels.mode_change import EventWork, change_contacts, event_work
 from rubhpc.kernels.piece_loop import advance_pieces
 from rubhpc.kernels.sampling import Measured
-from rubhpc.kernels.trail import Trail, begin_trail, new_trail, no_trail
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -171,15 +170,7 @@ class EventDrivenMarch(ModalMarch):
     def pass_sections(
         self, n_revolution: int, samples: Samples, accumulator: Accumulator
     ) -> tuple[Floats, str | None]:
-        """Go on by some revolutions without a record, in one kernel call where nothing new is met.
-
-        Returns
-        -------
-        (n_revolution, 2 n)
-            The motion at the end of each.
-        str or None
-            Why the case cannot go on.
-        """
+        """Go on by some revolutions without a record (`ModalMarch.pass_sections`)."""
         sections = np.empty((n_revolution, self._motion.size))
         level, first = self.clock.sample_level, -n_revolution * self.clock.samples_per_revolution
         restart_clock(self._bare_progress, first << level, first, is_recorded=False)
@@ -198,24 +189,6 @@ class EventDrivenMarch(ModalMarch):
             if self.check is not None:
                 self.check()
         return sections, None
-
-    def new_trail(self) -> Trail:
-        """Room for a trail of the case."""
-        return new_trail(*self.width)
-
-    @property
-    def width(self) -> tuple[int, int]:
-        """How many modal coordinates and pairs a trail of the case has."""
-        return self._z.shape[1], self._clearance.size
-
-    def keep(self, trail: Trail | None) -> None:
-        """Have the events from here on noted in a trail, or in none."""
-        self._note_in(no_trail() if trail is None else trail)
-        if trail is not None:
-            begin_trail(trail, self.mask, self._z)
-
-    def _note_in(self, trail: Trail) -> None:
-        self._event_work = self._event_work._replace(trail=trail)
 
     def _first_mask(self, contact_force: Floats) -> int:
         """Set of the contacts with which the case begins."""
@@ -303,6 +276,11 @@ class EventDrivenMarch(ModalMarch):
     def mask(self) -> int:
         """Present set of closed pairs."""
         return int(self.tables.mask[self._bare_progress["mode"]])
+
+    @property
+    def pair_states(self) -> int:
+        """States of all pairs as one number: the set of closed ones."""
+        return self.mask
 
     def touching(self) -> NDArray[np.bool_]:
         """Whether each pair is closed, (q,)."""

@@ -30,7 +30,6 @@ class March(ABC):
         self.n_probe = 0 if model.probe is None else len(model.probe.probes)
         self.n_body = model.n_place - len(model.turning_carriers)  # tips and carriers, their rotations aside
         self.n_step = 0
-        self.n_left = 0  # times that closed form was left for collocation
         self.sample = 0
         self.check = check
         self._stride = max(1, first_stride)

@@ -130,6 +130,29 @@ class ModalMarch(March):
     def _kernel(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
         """Advance from the tick reached to `last_tick`; returns an outcome of `kernels.case_progress`."""
 
+    @property
+    @abstractmethod
+    def pair_states(self) -> int:
+        """States of all pairs as one number."""
+
+    @abstractmethod
+    def begin(self, setup: ModalSetup, place: Place) -> None:
+        """Begin anew at another speed in the same reduced coordinates, from where a march has come."""
+
+    @abstractmethod
+    def pass_sections(
+        self, n_revolution: int, samples: Samples, accumulator: Accumulator
+    ) -> tuple[Floats, str | None]:
+        """Go on by some revolutions without a record, in few kernel calls where nothing new is met.
+
+        Returns
+        -------
+        (n_revolution, 2 n)
+            The motion at the end of each.
+        str or None
+            Why the case cannot go on.
+        """
+
     @abstractmethod
     def _unsolved(self) -> str:
         """Reason of an end where the kernel finds no forces, unless another march continues."""

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
     Solve = Callable[[int], "Solution | None"]
     Later = Callable[[bool, bool], Iterable[tuple[int, Solve]]]
-    Within = Callable[[], list[float]]
 
 Floats = NDArray[np.float64]
 
@@ -77,7 +76,6 @@ def regime(
     is_contact: bool,
     growth: Iterable[float],
     solve: Solve | None = None,
-    within: Within | None = None,
     later: Later | None = None,
     lasts: Callable[[float], bool] | None = None,
     n_event: float = 0.0,
@@ -105,8 +103,6 @@ def regime(
         Growth of a small displacement per revolution, span by span; read only where it is needed.
     solve : callable, optional
         Finds the motion of a period next to the end of the record (`proof.Solver`).
-    within : callable, optional
-        Growth of a small displacement within the record, span by span (`lyapunov.Growth.within`).
     later : callable, optional
         Searches in later revolutions, in order, where the record looks periodic or does not, and where it
         looks chaotic or does not (`proof.Solver.later`).
@@ -133,7 +129,7 @@ def regime(
     if orbit.n_revolution < LEAST_REVOLUTIONS:
         return Verdict(periodic, orbit.closest_return) if repeats else Verdict(REGIME.index("undecided"), 0)
     is_closed = is_long and is_torus(orbit.distances)  # the cycles lie on a closed curve
-    flag, exponent = by_growth(growth, within, is_closed=is_closed, is_cheap=solve is not None)
+    flag, exponent = by_growth(growth, is_closed=is_closed, is_cheap=solve is not None)
     if search.turns_away and flag == periodic and exponent > -CLEAR:
         flag = REGIME.index("quasi_periodic")  # a torus around it, still too close to be distinguished
     if repeats and flag != REGIME.index("chaotic"):
@@ -223,7 +219,6 @@ class _Search:
 
 def by_growth(
     growth: Iterable[float],
-    within: Within | None = None,
     *,
     is_closed: bool = False,
     is_cheap: bool = False,
@@ -233,13 +228,11 @@ def by_growth(
     `is_closed`: the cycles lie on a closed curve (`is_torus`). `is_cheap`: spans may be read until a
     displacement has found its direction; with many slow modes it first decreases for long.
     """
-    grown = [] if within is None else list(within())
-    if is_closed and grown and abs(np.mean(grown)) < CLEAR:
-        return REGIME.index("quasi_periodic"), float(np.mean(grown))
+    grown: list[float] = []
     spans = iter(growth)
 
     def reaches(n_span: int) -> bool:
-        """Whether so many spans are known or can be read."""
+        """Whether so many spans can be read."""
         grown.extend(islice(spans, max(0, n_span - len(grown))))
         return len(grown) >= n_span
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.integrate.marches.collocation import CollocationMarch
+from rubhpc.integrate.marches.collocation import CollocationMarch, code_of, states_of
 from rubhpc.integrate.periodic_motions.piecewise_motion import (
     MOST_EVENTS,
     Change,
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.record import State
-    from rubhpc.integrate.setup import Setup
     from rubhpc.kernels.collocation.tangent import Trail
 
 Floats = NDArray[np.float64]
@@ -38,26 +37,12 @@ Ints = NDArray[np.int64]
 
 ACCURACY = 1e-4  # of forces, at most: periodic motions close to about a hundredth of it
 UNRELATED = 1e-25  # of the largest: less is of motions that do not act on each other, and spoils eigenvectors
-STATE_BITS = 2  # of a pair in the number of all states
 
 
-def followed_motion(
-    setup: Setup, accuracy: float = ACCURACY
-) -> Callable[..., PiecewiseMotion | CollocatedMotion]:
-    """Return what follows the motions of a set-up: in closed form, or by collocation to an accuracy."""
-    is_collocated = setup.scheme is Scheme.COLLOCATION
+def followed_motion(scheme: Scheme, accuracy: float = ACCURACY) -> Callable[..., FollowedMotion]:
+    """Return what follows motions: in closed form, or by collocation to an accuracy."""
+    is_collocated = scheme is Scheme.COLLOCATION
     return partial(CollocatedMotion, accuracy=accuracy) if is_collocated else PiecewiseMotion
-
-
-def code_of(states: Ints) -> int:
-    """States of all pairs as one number."""
-    return sum((int(state) & 3) << STATE_BITS * i for i, state in enumerate(states))
-
-
-def states_of(code: int, q: int) -> Ints:
-    """States (q,) of a number: open, sliding forward or backward, sticking."""
-    found = np.array([code >> STATE_BITS * i & 3 for i in range(q)])
-    return np.where(found == 3, -1, found)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -127,6 +112,7 @@ class CollocatedMotion:
         self.energy[: self.n] = setup.spin**2
         self._accuracy = min(setup.accuracy, accuracy)
         self.start, self.states = march.motion(), code_of(march.states)
+        self._at = 0  # tick
 
     @property
     def _turn(self) -> int:
@@ -230,20 +216,29 @@ class CollocatedMotion:
         self.march.place_at(first.motion, states_of(first.begun, self.q), first.begin)
         columns = np.eye(2 * self.n)
         for revolution in revolutions:
-            columns = self._carried(revolution.last, columns)
+            columns = self._carried(revolution.last, columns, MOST_EVENTS)
         columns[np.abs(columns) < UNRELATED * np.abs(columns).max()] = 0.0
         return columns
 
-    def revolve_with(self, motion: Floats, states: int, columns: Floats) -> tuple[Floats, int, Floats]:
-        """Motion and states after a revolution, and what small changes (2 n, k) of the beginning become."""
-        march = self.march
-        march.place_at(motion, states_of(states, self.q), 0)
-        moved = self._carried(self._turn, columns)
-        return march.motion(), code_of(march.states), moved
+    def stand_at(self, motion: Floats, states: int) -> None:
+        """Stand at the shaft's angle 0 with a motion (2 n,) and the pairs in these states."""
+        self.march.place_at(motion, states_of(states, self.q), 0)
+        self._at = 0
 
-    def _carried(self, tick: int, columns: Floats) -> Floats:
+    def go_on(self, columns: Floats, n_revolution: int = 1) -> Floats:
+        """Go on by some revolutions; return what small changes (2 n, k) of the motion become.
+
+        Raises
+        ------
+        Unfollowed
+            As `follow`.
+        """
+        self._at += n_revolution * self._turn
+        return self._carried(self._at, columns, 0)
+
+    def _carried(self, tick: int, columns: Floats, most_events: int) -> Floats:
         """What becomes of small changes (2 n, k) of the motion up to a tick."""
-        moved: Floats = self.march.modes.motion @ self._carry(tick, columns, MOST_EVENTS).columns
+        moved: Floats = self.march.modes.motion @ self._carry(tick, columns, most_events).columns
         return moved
 
     def _carry(self, tick: int, columns: Floats, most_events: int) -> Trail:
@@ -275,3 +270,6 @@ class CollocatedMotion:
             elif was[i] != OPEN and was[i] != after[i]:
                 found.append((i, "stick" if after[i] == STICKING else "slip"))
         return found
+
+
+FollowedMotion = PiecewiseMotion | CollocatedMotion

@@ -113,7 +113,7 @@ class Family:
         if value not in self._cases:
             setup, clearance, friction = self.settings(value, is_measured=self.along not in SPEEDS)
             try:
-                begin = followed_motion(setup, ACCURACY)
+                begin = followed_motion(setup.scheme, ACCURACY)
                 found = begin(setup, clearance, friction, State.at_rest(setup.model))
             except NoClosedForm:
                 raise Unfollowed("contacts open and close without end, or in too many combinations") from None

@@ -14,8 +14,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.periodic_motions.collocated_motion import CollocatedMotion
-    from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
+    from rubhpc.integrate.periodic_motions.collocated_motion import FollowedMotion
 
     Floats = NDArray[np.float64]
 
@@ -23,7 +22,7 @@ ALIGNING, FOLLOWED = 16, 256  # revolutions: to align the displacements, then to
 LOST = 1e-280  # a smaller displacement counts as zero
 
 
-def spectrum_of(begin: Callable[[], PiecewiseMotion | CollocatedMotion], n_exponent: int) -> dict[str, float]:
+def spectrum_of(begin: Callable[[], FollowedMotion], n_exponent: int) -> dict[str, float]:
     """Measures `lyapunov_1`, ... and `kaplan_yorke_dimension` of the motion from where a case stands.
 
     Parameters
@@ -47,7 +46,7 @@ def spectrum_of(begin: Callable[[], PiecewiseMotion | CollocatedMotion], n_expon
 
 
 def exponents(
-    piecewise: PiecewiseMotion | CollocatedMotion,
+    piecewise: FollowedMotion,
     n_exponent: int,
     *,
     aligning: int = ALIGNING,
@@ -68,11 +67,10 @@ def exponents(
     # Columns that mix displacements and velocities, the same for every case.
     angle = np.pi * (np.arange(2 * piecewise.n) + 0.5) / (2 * piecewise.n)
     columns = np.linalg.qr(np.cos(np.outer(angle, np.arange(n_exponent))))[0]
-    motion, states = piecewise.start, piecewise.states
+    piecewise.stand_at(piecewise.start, piecewise.states)
     grown = np.zeros(n_exponent)
     for i_revolution in range(aligning + followed):
-        motion, states, moved = piecewise.revolve_with(motion, states, columns / weight)
-        columns, triangle = np.linalg.qr(weight * moved)
+        columns, triangle = np.linalg.qr(weight * piecewise.go_on(columns / weight))
         if i_revolution >= aligning:
             size = np.abs(np.diag(triangle))
             with np.errstate(divide="ignore"):

@@ -15,6 +15,7 @@ from rubhpc.integrate.periodic_motions.revolution import (
     Piece,
     Revolution,
     copied,
+    cut,
     longer,
     whole_revolutions,
 )
@@ -45,7 +46,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Change = Literal["touch", "release", "slip", "stick"]
 
-MOST_EVENTS = 1000  # in a revolution
+MOST_EVENTS, MANY_EVENTS = 1000, 2**14  # in a revolution; where it is followed without end
 FEW_MODES = 4  # that others have read before, and that are read at once
 FEW_PIECES = 32  # that there is room for at first
 WITH_MODES = 2.2  # bytes of tables and modes, as solved and for pieces, over those of tables
@@ -107,11 +108,12 @@ class PiecewiseMotion:
         self._take_tables()
         self._rows = piece_rows(FEW_PIECES, 2 * self.n, self.q)
         self._passage = new_passage(2 * self.n)
-        self._asked: tuple[int, int, float, float] | None = None
+        self._asked: tuple[int, float, float, int] | None = None
         clock = self.march.clock
         self.highest = self._tables.power_re.shape[1] - 1
         self.longest = min(self.highest, int(math.log2(self.turn / STEPS_PER_REVOLUTION / clock.tick)))
         self.start, self.states = self.march.motion(), self.march.mask
+        self.stand_at(self.start, self.states)
 
     def size(self, motion: Floats) -> float:
         """Root of v'v + spin^2 u'u of a reduced motion (2 n,), in which the mass matrix is the identity."""
@@ -189,8 +191,15 @@ class PiecewiseMotion:
         share: float = 1.0,
     ) -> list[Revolution]:
         """Follow a motion through several revolutions, each as `revolve` does."""
-        timing = self.timing(self.longest, most_events, phase, share)
-        passage, least = self._passage, np.full((n_revolution, 2, self.q), np.inf)
+        least = np.full((n_revolution, 2, self.q), np.inf)
+        n_piece = self._follow(
+            motion, states, least, self.timing(most_events, phase, share, longest=self.longest)
+        )
+        return whole_revolutions(copied(self._rows, n_piece), least)
+
+    def _follow(self, motion: Floats, states: int, least: Floats, timing: Timing) -> int:
+        """Follow a motion through as many revolutions as `least` (r, 2, q) has; return its pieces."""
+        passage = self._passage
         begin_passage(passage, motion, states, timing.begin)
         outcome = MODE_UNKNOWN
         while outcome != FOLLOWED:
@@ -199,7 +208,7 @@ class PiecewiseMotion:
             elif outcome == FULL:
                 self._rows = longer(self._rows)
             else:
-                raise Unfollowed(self.why_unfollowed(outcome, most_events))
+                raise Unfollowed(self.why_unfollowed(outcome, timing.most_events))
             outcome = follow_revolutions(
                 self.known,
                 self.bodies,
@@ -210,11 +219,11 @@ class PiecewiseMotion:
                 least,
                 *self.march.change_work,
             )
-        return whole_revolutions(copied(self._rows, int(passage.reached[PIECE])), least)
+        return int(passage.reached[PIECE])
 
-    def timing(self, longest: int, most_events: int, phase: float = 0.0, share: float = 1.0) -> Timing:
+    def timing(self, most_events: int, phase: float = 0.0, share: float = 1.0, *, longest: int) -> Timing:
         """Times of a share of a revolution from a phase on, in steps up to a level; the last one is kept."""
-        asked, clock = (longest, most_events, phase, share), self.march.clock
+        asked, clock = (most_events, phase, share, longest), self.march.clock
         if self._asked != asked:
             self._asked = asked
             self._timing = Timing(
@@ -241,10 +250,23 @@ class PiecewiseMotion:
         """Derivative (2 n, 2 n) of a motion's end by its beginning."""
         return monodromy(self, revolutions)
 
-    def revolve_with(self, motion: Floats, states: int, columns: Floats) -> tuple[Floats, int, Floats]:
-        """Motion and states after a revolution, and what small changes (2 n, k) of the beginning become."""
-        revolution = self.revolve(motion, states)
-        return revolution.end, revolution.states, carried(self, revolution.rows, columns)
+    def stand_at(self, motion: Floats, states: int) -> None:
+        """Stand at the shaft's angle 0 with a motion (2 n,) and the pairs in these states."""
+        self._stands = motion, states
+
+    def go_on(self, columns: Floats, n_revolution: int = 1) -> Floats:
+        """Go on by some revolutions; return what small changes (2 n, k) of the motion become.
+
+        Raises
+        ------
+        Unfollowed
+            As `revolve`.
+        """
+        least = np.full((n_revolution, 2, self.q), np.inf)
+        n_piece = self._follow(*self._stands, least, self.timing(MANY_EVENTS, longest=self.highest))
+        passage = self._passage
+        self._stands = passage.motion.copy(), int(passage.reached[STATES])
+        return carried(self, cut(self._rows, 0, n_piece), columns)
 
     def change_room(self, k: int) -> ChangeRoom:
         """Room in which k small changes are carried; the same each time."""

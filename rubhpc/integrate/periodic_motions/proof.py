@@ -12,7 +12,6 @@ from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.measuring.orbit_measures import PERIOD_TOLERANCE, closest_return
 from rubhpc.integrate.measuring.regimes import MOST_DOUBLED, MOST_EVENTS, Solution
 from rubhpc.integrate.packing import output_degrees
-from rubhpc.integrate.periodic_motions.collocated_motion import followed_motion
 from rubhpc.integrate.periodic_motions.shooting import NotConverged, Orbit, shoot
 from rubhpc.integrate.transient import idle_of
 
@@ -21,11 +20,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.marches.collocation import CollocationMarch
-    from rubhpc.integrate.marches.event_driven import EventDrivenMarch
+    from rubhpc.integrate.marches.modal import ModalMarch
     from rubhpc.integrate.modal_setup import ModalSetup
-    from rubhpc.integrate.periodic_motions.collocated_motion import CollocatedMotion
-    from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
+    from rubhpc.integrate.periodic_motions.collocated_motion import FollowedMotion
     from rubhpc.integrate.record import State
 
     Floats = NDArray[np.float64]
@@ -49,26 +46,26 @@ class Solver:
 
     def __init__(
         self,
-        setup: ModalSetup,
-        clearance: float,
-        friction: float,
+        motion_of: Callable[[State, ModalMarch | None], FollowedMotion],
         final: State,
-        march: EventDrivenMarch | CollocationMarch | None = None,
+        march: ModalMarch | None = None,
     ) -> None:
-        """Take the end of a case in closed form; a march of it that is needed no more is started again."""
-        self._case = setup, clearance, friction, final
-        self._piecewise: PiecewiseMotion | CollocatedMotion | None = None
-        self._march = march
+        """Take the end of a case; a march of it that is needed no more is started again.
+
+        `motion_of` makes what follows its motions from a state, with such a march.
+        """
+        self._motion_of, self._final, self._march = motion_of, final, march
+        self._followed: FollowedMotion | None = None
         self.followed: tuple[Floats, State] | None = None  # energies at revolutions, and the end
 
     def __call__(self, period: int) -> Solution | None:
         """Return the motion that closes after this many revolutions, or fewer; None where none is found."""
         try:
-            if self._piecewise is None:
-                self._piecewise = followed_motion(self._case[0])(*self._case, self._march)
+            if self._followed is None:
+                self._followed = self._motion_of(self._final, self._march)
         except NoClosedForm:
             return None
-        return _solution(self._piecewise, period, MOST_ITERATIONS, LEAST_STEP)
+        return _solution(self._followed, period, MOST_ITERATIONS, LEAST_STEP)
 
     def later(
         self, looks_periodic: bool, looks_chaotic: bool
@@ -82,22 +79,17 @@ class Solver:
         periodic motion; at the end also where they return within 1 %, nearer than ever and in half the
         distance of the beginning. A case that reaches the end is in `followed`.
         """
-        setup, clearance, friction, state = self._case
         n_on, tried = 0, ARRIVED / NEARER
-        n_pair = len(setup.model.stators)
-        n_looks = N_LOOKS if looks_periodic or n_pair <= FEW_PAIRS else N_SHORT
-        if n_pair >= MANY_PAIRS and not looks_periodic:
-            n_looks = 0  # what is not recorded may need contact modes of its own
-        spans = LATER[: n_looks + N_MORE * looks_chaotic]
-        if not spans:
-            return
         energy: list[Floats] = []
         returned: list[float] = []
         try:
-            march = self._march or followed_motion(setup)(setup, clearance, friction, state).march
-            march.keep(None)
-            march.start_again(state)
-            self._piecewise = None  # it may have followed this march
+            followed = self._followed or self._motion_of(self._final, self._march)
+            n_looks = N_LOOKS if looks_periodic or followed.q <= FEW_PAIRS else N_SHORT
+            if followed.q >= MANY_PAIRS and not looks_periodic:
+                n_looks = 0  # what is not recorded may need contact modes of its own
+            spans = LATER[: n_looks + N_MORE * looks_chaotic]
+            march, setup = followed.march, followed.setup
+            march.start_again(self._final)
             for n_revolution in spans:
                 passed, reason = march.pass_sections(n_revolution, *idle_of(march))
                 if reason is not None:
@@ -111,45 +103,42 @@ class Solver:
                 if apart > NEARER * tried and not draws_near:
                     continue
                 tried, state = apart, march.final()
-                later = followed_motion(setup)(setup, clearance, friction, state)
-                yield period, partial(_solved_later, later, n_on)
+                yield period, partial(_solved_later, self._motion_of(state, None), n_on)
                 march.start_again(state)
-            self.followed = np.concatenate(energy), march.final()
+            if energy:
+                self.followed = np.concatenate(energy), march.final()
         except NoClosedForm:
             return
 
 
 def _solution(
-    piecewise: PiecewiseMotion | CollocatedMotion, period: int, most_iterations: int, least_step: float
+    followed: FollowedMotion, period: int, most_iterations: int, least_step: float
 ) -> Solution | None:
     """Motion that closes after a period, or after a divisor of it; None where none is found."""
     try:
         orbit = shoot(
-            piecewise,
-            piecewise.start,
-            piecewise.states,
+            followed,
+            followed.start,
+            followed.states,
             period,
             most_iterations=most_iterations,
             least_step=least_step,
             most_events=MOST_EVENTS // period,
-            watches_turns=False,
         )
     except (NoClosedForm, NotConverged):
         return None
-    away = piecewise.size(piecewise.start - orbit.motion)
+    away = followed.size(followed.start - orbit.motion)
     return Solution(
         orbit.period,
         complex(orbit.multipliers[0]),
-        _section(piecewise, orbit),
-        is_led_to=away <= PERIOD_TOLERANCE * piecewise.size(orbit.motion),
+        _section(followed, orbit),
+        is_led_to=away <= PERIOD_TOLERANCE * followed.size(orbit.motion),
     )
 
 
-def _solved_later(
-    piecewise: PiecewiseMotion | CollocatedMotion, n_revolution: int, period: int
-) -> Solution | None:
+def _solved_later(followed: FollowedMotion, n_revolution: int, period: int) -> Solution | None:
     """Motion found from so many revolutions behind the end of a record, its section turned back to that."""
-    found = _solution(piecewise, period, PATIENT_ITERATIONS, PATIENT_STEP)
+    found = _solution(followed, period, PATIENT_ITERATIONS, PATIENT_STEP)
     return found and found._replace(section=np.roll(found.section, n_revolution, axis=0))
 
 
@@ -178,10 +167,10 @@ def _falls(apart: list[float]) -> bool:
     return apart[-1] <= NEARER * apart[0] and apart[-1] == min(apart)
 
 
-def _section(piecewise: PiecewiseMotion | CollocatedMotion, orbit: Orbit) -> Floats:
+def _section(followed: FollowedMotion, orbit: Orbit) -> Floats:
     """Displacement of the output node where revolutions begin."""
-    setup = piecewise.setup
+    setup = followed.setup
     rows = output_degrees(setup.model)[:2]
     sag = np.where(rows >= 0, setup.model.sag[rows], 0.0)
     begun = [orbit.motion, *(revolution.end for revolution in orbit.revolutions[:-1])]
-    return np.array([setup.reduced.output[:2] @ motion[: piecewise.n] + sag for motion in begun])
+    return np.array([setup.reduced.output[:2] @ motion[: followed.n] + sag for motion in begun])

@@ -9,60 +9,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rubhpc.integrate.periodic_motions.collocated_motion import CollocatedMotion
-from rubhpc.integrate.periodic_motions.piecewise_motion import (
-    FEW_PIECES,
-    MOST_EVENTS,
-    PiecewiseMotion,
-    Unfollowed,
-)
-from rubhpc.integrate.periodic_motions.revolution import copied, longer, whole_revolutions
-from rubhpc.integrate.periodic_motions.shooting_by_revolutions import Search
-from rubhpc.kernels.revolutions import (
-    FULL,
-    MODE_UNKNOWN,
-    STATES,
-    begin_passage,
-    new_passage,
-    piece_rows,
-)
-from rubhpc.kernels.shooting import (
-    BEGINS,
-    BEST,
-    CARRIED,
-    FAR,
-    FOLLOWING,
-    FOUND,
-    ITERATION,
-    LOST,
-    N_PIECE,
-    N_SHORTEST,
-    NEXT,
-    RESIDUAL,
-    SINGULAR,
-    STALLED,
-    STEPPING,
-    TOO_LONG,
-    TRIED,
-    new_search,
-    search_period,
-)
+from rubhpc.integrate.periodic_motions.piecewise_motion import MOST_EVENTS, Unfollowed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.periodic_motions.collocated_motion import CollocatedRevolution
-    from rubhpc.integrate.periodic_motions.revolution import Revolution
-    from rubhpc.kernels.flow import Timing
-    from rubhpc.kernels.shooting import Search as KernelSearch
+    from rubhpc.integrate.periodic_motions.collocated_motion import FollowedMotion
 
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
+    Revolutions = Sequence[Any]  # of one kind
 
 MOST_ITERATIONS = 30
 LEAST_STEP = 1 / 128  # share of Newton's step that is tried last
+LESS = 0.25  # of a share of a step: by as much, of itself, it must make the residual less
+FAST = 0.05  # ratio of two residuals up to which a derivative serves once more
 NEAR_GRAZING = 1e-2  # of spin times clearance: a touch that is slower grazes
 
 
@@ -113,7 +76,7 @@ def floquet_multipliers(monodromy: Floats) -> Complexes:
 
 
 def shoot(
-    piecewise: PiecewiseMotion | CollocatedMotion,
+    followed: FollowedMotion,
     motion: Floats,
     states: int,
     period: int,
@@ -122,9 +85,8 @@ def shoot(
     least_step: float = LEAST_STEP,
     most_events: int = MOST_EVENTS,
     most_residual: float = math.inf,
-    watches_turns: bool = True,
 ) -> Orbit:
-    """Find the periodic motion near a beginning, by Newton's method (`kernels.shooting.search_period`).
+    """Find the periodic motion near a beginning, by Newton's method.
 
     Parameters
     ----------
@@ -138,8 +100,6 @@ def shoot(
         In a revolution; a motion with more is not followed.
     most_residual : float
         Of the beginning: from one that is farther from closing nothing is sought.
-    watches_turns : bool
-        Whether steps are short enough for `least_gap` and `least_force` of the revolutions.
 
     Returns
     -------
@@ -149,157 +109,129 @@ def shoot(
     Raises
     ------
     NotConverged
-        No motion was found that closes to 1e-10 of its size.
+        No motion was found that closes as nearly as `Tolerances` says.
     """
-    if isinstance(piecewise, CollocatedMotion):
-        given = motion, states, period
-        return _shoot_by_revolutions(
-            piecewise, *given, most_iterations, least_step, most_events, most_residual
-        )
-    longest = piecewise.longest if watches_turns else piecewise.highest
-    search = new_search(motion.size, most_iterations, least_step, most_residual)
-    shot = _Shot(piecewise, motion, states, period, piecewise.timing(longest, most_events), search)
     try:
-        outcome = shot.run()
-    except Unfollowed as problem:
-        raise NotConverged(str(problem)) from None
-    residual, now = float(shot.search.share[RESIDUAL]), shot.search.now
-    if outcome == FOUND:
-        return shot.orbit()
-    if outcome == FAR:
-        raise NotConverged(f"the initial state is far from periodic, residual {residual:.2g}")
-    if outcome == STALLED:
-        usual = abs(piecewise.setup.spin * piecewise.bodies.clearance)
-        grazing = _grazing(shot.revolutions(int(now[N_PIECE])), usual)
-        raise NotConverged(f"Newton's method stalls at a residual of {residual:.2g}{grazing}")
-    if outcome == TOO_LONG:
-        raise NotConverged(f"no convergence within {most_iterations} iterations, residual {residual:.2g}")
-    raise NotConverged(piecewise.why_unfollowed(outcome, most_events))
-
-
-def _shoot_by_revolutions(
-    followed: CollocatedMotion,
-    motion: Floats,
-    states: int,
-    period: int,
-    most_iterations: int,
-    least_step: float,
-    most_events: int,
-    most_residual: float,
-) -> Orbit:
-    """Search as `shoot` does, for a motion without closed form."""
-    try:
-        search = Search(followed, motion, states, period, most_events)
+        search = _Search(followed, motion, states, period, most_events)
         if search.residual > most_residual:
             raise NotConverged(f"the initial state is far from periodic, residual {search.residual:.2g}")
         problem = search.run(most_iterations, least_step)
+        if not problem:
+            return search.orbit()
     except Unfollowed as unfollowed:
         raise NotConverged(str(unfollowed)) from None
-    if problem:
-        usual = abs(followed.setup.spin * followed.bodies.clearance)
-        grazing = _grazing(search.revolutions, usual)
-        raise NotConverged(f"{problem} at a residual of {search.residual:.2g}{grazing}")
-    revolutions = search.revolutions[: search.shortest()]
-    return Orbit(
-        motion=search.motion,
-        states=search.states,
-        revolutions=tuple(revolutions),
-        monodromy=search.monodromy(len(revolutions)),
-        residual=search.residual,
-        iterations=search.iterations,
-    )
+    usual = abs(followed.setup.spin * followed.bodies.clearance)
+    grazing = _grazing(search.revolutions, usual)
+    raise NotConverged(f"{problem} at a residual of {search.residual:.2g}{grazing}")
 
 
-class _Shot:
-    """A search under way: what its kernel works with."""
+class _Search:
+    """A search under way: the best beginning so far, the revolutions from there, and their residual.
+
+    The derivative is that of an earlier motion as long as steps by it make the residual much smaller.
+    """
 
     def __init__(
         self,
-        piecewise: PiecewiseMotion,
+        followed: FollowedMotion,
         motion: Floats,
         states: int,
         period: int,
-        timing: Timing,
-        search: KernelSearch,
+        most_events: int,
     ) -> None:
-        self._piecewise, self._timing, self.search = piecewise, timing, search
-        self._passage = new_passage(motion.size)
-        begin_passage(self._passage, motion, states, timing.begin)
-        self._least = np.full((period, 2, piecewise.q), np.inf)
-        k = FEW_PIECES * period
-        self._rows = [piece_rows(k, motion.size, piecewise.q) for _ in range(2)]
-        search.tried[:] = motion
-        search.now[TRIED] = states
+        """Follow the beginning; `Unfollowed` where it cannot be."""
+        self._case, self._period, self._most_events = followed, period, most_events
+        self._tolerances = followed.tolerances
+        self._motion, self._states, self._iterations = motion, states, 0
+        self.revolutions: Revolutions = followed.follow(motion, states, period, most_events)
+        self.residual = self._residual(motion, self.revolutions)
+        self._matrix: Floats | None = None  # derivative of the residual
+        self._differs = np.inf  # how far from the present motion that derivative was found, over its size
 
-    def run(self) -> int:
-        """Search to an outcome, and do on the way what the kernel leaves to its caller.
-
-        Raises
-        ------
-        Unfollowed
-            The beginning cannot be followed.
-        """
-        now = self.search.now
-        while True:
-            outcome = self._call()
-            under_way = 1 - int(now[BEST])
-            try:
-                if outcome == MODE_UNKNOWN:
-                    self._piecewise.mode(self._wanted())
-                elif outcome == FULL:
-                    self._rows[under_way] = longer(self._rows[under_way])
-                elif outcome == SINGULAR:  # at a fold
-                    matrix = np.eye(len(self.search.step)) - self.search.columns
-                    self.search.step[:] = np.linalg.lstsq(matrix, self.search.defect, rcond=1e-12)[0]
-                    now[NEXT] = STEPPING
-                else:
-                    return outcome
-            except Unfollowed:
-                if now[N_PIECE] == 0 or now[NEXT] != FOLLOWING:
-                    raise
-                now[NEXT] = LOST
+    def run(self, most_iterations: int, least_step: float) -> str:
+        """Take Newton steps, or shares of them; returns why the motion does not close, or ""."""
+        tolerances = self._tolerances
+        while self.residual > tolerances.closed or not self._repeats:
+            is_enough = self.residual <= tolerances.enough and self._repeats
+            if self._iterations == most_iterations:
+                return "" if is_enough else f"no convergence within {most_iterations} iterations"
+            self._iterations += 1
+            matrix = self._find_derivative() if self._matrix is None else self._matrix
+            before, defect = self.residual, self.revolutions[-1].end - self._motion
+            step = np.linalg.lstsq(matrix, defect, rcond=1e-12)[0].astype(float)
+            is_better = self._improve(step, least_step)
+            if not is_better and self._differs == 0.0:
+                return "" if is_enough else "Newton's method stalls"
+            self._differs += self._case.size(step) / self._case.size(self._motion)
+            if not is_better or self.residual > FAST * before:
+                if is_enough:
+                    break
+                self._matrix = None
+        return ""
 
     def orbit(self) -> Orbit:
         """The motion that was found, over its shortest period."""
-        now = self.search.now
+        revolutions = self.revolutions[: self._shortest()]
+        is_near = self._matrix is not None and self._differs <= self._tolerances.derivative
+        if is_near and len(revolutions) == self._period:
+            assert self._matrix is not None
+            monodromy = np.eye(self._motion.size) - self._matrix
+        else:
+            monodromy = self._case.monodromy(revolutions)
         return Orbit(
-            motion=self.search.motion,
-            states=int(now[BEGINS]),
-            revolutions=tuple(self.revolutions(int(now[N_SHORTEST]))),
-            monodromy=self.search.columns,
-            residual=float(self.search.share[RESIDUAL]),
-            iterations=int(now[ITERATION]),
+            motion=self._motion,
+            states=self._states,
+            revolutions=tuple(revolutions),
+            monodromy=monodromy,
+            residual=self.residual,
+            iterations=self._iterations,
         )
 
-    def revolutions(self, n_piece: int) -> list[Revolution]:
-        """Those of the best trial, up to a piece."""
-        return whole_revolutions(copied(self._rows[int(self.search.now[BEST])], n_piece), self._least)
+    @property
+    def _repeats(self) -> bool:
+        """Whether the pairs end in the states in which they begin, as far as steps decide that alike."""
+        return not self._case.is_exact or self.revolutions[-1].states == self._states
 
-    def _wanted(self) -> int:
-        """States of the pairs whose contact mode the kernel asks for."""
-        now = self.search.now
-        if now[NEXT] == FOLLOWING:
-            return int(self._passage.reached[STATES])
-        return int(self._rows[int(now[BEST])].states[now[CARRIED], 0])
+    def _shortest(self) -> int:
+        """Revolutions after which the motion closes: a divisor of the period."""
+        most = self._tolerances.divides * self._case.size(self._motion)
+        for d in range(1, self._period):
+            if self._period % d == 0 and self._case.size(self.revolutions[d - 1].end - self._motion) <= most:
+                return d
+        return self._period
 
-    def _call(self) -> int:
-        piecewise = self._piecewise
-        return search_period(
-            piecewise.known,
-            piecewise.bodies,
-            piecewise.room,
-            self._timing,
-            self.search,
-            piecewise.change_room(self.search.step.size),
-            self._passage,
-            self._rows[0],
-            self._rows[1],
-            self._least,
-            *piecewise.march.change_work,
-        )
+    def _find_derivative(self) -> Floats:
+        self._matrix = np.eye(self._motion.size) - self._case.monodromy(self.revolutions)
+        self._differs = 0.0
+        return self._matrix
+
+    def _improve(self, step: Floats, least_step: float) -> bool:
+        """Take the largest share of a step that makes the residual less by enough.
+
+        Each begins with the states with which the best trial ended, then with those with which it began.
+        """
+        share = 1.0
+        while share >= least_step:
+            motion = self._motion + share * step
+            for states in dict.fromkeys((self.revolutions[-1].states, self._states)):
+                try:
+                    revolutions = self._case.follow(motion, states, self._period, self._most_events)
+                except Unfollowed:
+                    continue
+                residual = self._residual(motion, revolutions)
+                if residual < (1.0 - LESS * share) * self.residual:
+                    self._motion, self._states = motion, states
+                    self.revolutions, self.residual = revolutions, residual
+                    return True
+            share *= 0.5
+        return False
+
+    def _residual(self, motion: Floats, revolutions: Revolutions) -> float:
+        size = max(self._case.size(motion), np.finfo(float).tiny)
+        return self._case.size(revolutions[-1].end - motion) / size
 
 
-def _grazing(revolutions: Sequence[Revolution | CollocatedRevolution], usual: Floats) -> str:
+def _grazing(revolutions: Revolutions, usual: Floats) -> str:
     """What a failure has to do with grazing; "" where nothing.
 
     `usual` (q,), m/s, are spin times clearance of each pair. A gap that opens where it is found closed, since

@@ -16,7 +16,6 @@ import numpy as np
 
 from rubhpc.integrate.measuring.regimes import known_regime
 from rubhpc.integrate.periodic_motions.approach import Approach
-from rubhpc.integrate.periodic_motions.contacts_nearby import ContactsNearby
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -25,14 +24,13 @@ if TYPE_CHECKING:
 
     from rubhpc.integrate.measuring.regimes import Verdict
     from rubhpc.integrate.modal_setup import ModalSetup
-    from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
+    from rubhpc.integrate.periodic_motions.collocated_motion import FollowedMotion
     from rubhpc.integrate.periodic_motions.shooting import Orbit
     from rubhpc.integrate.record import Record
 
     Floats = NDArray[np.float64]
 
 LOOK = 4  # revolutions from one look at the distance of a case to the next, or a period if that is longer
-GRAIN = 2.0**-20  # to which motions are rounded, of their size: Newton's method then takes a step at least
 MOST_KEPT = 16  # motions of one operating point
 
 
@@ -45,16 +43,15 @@ class SolvedMotion:
         Distances from it.
     n_period : int
         Periods from one look at the distance of a case to the next.
-    record : (Record, int, int) or None
-        Its record, once there is one, the steps of that, and how often it left closed form.
+    record : (Record, int) or None
+        Its record, once there is one, and the steps of that.
     """
 
-    def __init__(self, piecewise: PiecewiseMotion, orbit: Orbit) -> None:
+    def __init__(self, followed: FollowedMotion, orbit: Orbit) -> None:
         self.orbit, self.period = orbit, orbit.period
-        self.approach = Approach.to(piecewise, orbit.monodromy)
+        self.approach = Approach(orbit.monodromy, followed.energy)
         self.n_period = max(1, LOOK // orbit.period)
-        self.record: tuple[Record, int, int] | None = None
-        self._contacts: ContactsNearby | None = None
+        self.record: tuple[Record, int] | None = None
 
     @property
     def is_doubled(self) -> bool:
@@ -66,17 +63,11 @@ class SolvedMotion:
         """Derivative of the motion at a look by that at the one before, (2 n, 2 n)."""
         return np.linalg.matrix_power(self.orbit.monodromy, self.n_period)
 
-    def contacts(self, piecewise: PiecewiseMotion) -> ContactsNearby:
-        """Contacts of cases near it."""
-        if self._contacts is None:
-            self._contacts = ContactsNearby(piecewise, self.orbit, self.approach)
-        return self._contacts
-
     def judge(
         self, _vertical: Floats, _horizontal: Floats, _per_revolution: int, is_contact: bool
     ) -> Verdict:
         """Judge its record, whatever the orbit."""
-        return known_regime(self.period, self.approach.multiplier, is_contact=is_contact)
+        return known_regime(self.period, self.orbit.multipliers[0], is_contact=is_contact)
 
 
 class SolvedMotions:
@@ -89,7 +80,10 @@ class SolvedMotions:
         return len(self._kept)
 
     def of(
-        self, piecewise: PiecewiseMotion, orbit: Orbit, shoot_from: Callable[[Floats, int, int], Orbit]
+        self,
+        followed: FollowedMotion,
+        orbit: Orbit,
+        shoot_from: Callable[[Floats, int, int], Orbit],
     ) -> SolvedMotion:
         """Return the motion that was solved for, as any case that leads to it gets it.
 
@@ -98,20 +92,20 @@ class SolvedMotions:
         shoot_from : callable
             Solves for the motion near a beginning (2 n,), with the pairs in these states, of a period.
         """
-        begun = rounded(orbit.motion, piecewise)
+        begun = rounded(orbit.motion, followed)
         key = orbit.period, orbit.states, begun.tobytes()
         if key not in self._kept:
-            self._kept[key] = SolvedMotion(piecewise, shoot_from(begun, orbit.states, orbit.period))
+            self._kept[key] = SolvedMotion(followed, shoot_from(begun, orbit.states, orbit.period))
             if len(self._kept) > MOST_KEPT:
                 self._kept.popitem(last=False)
         self._kept.move_to_end(key)
         return self._kept[key]
 
 
-def rounded(motion: Floats, piecewise: PiecewiseMotion) -> Floats:
-    """A motion (2 n,), rounded to a power of two, about a millionth of its size."""
-    grain = GRAIN * 2.0 ** math.frexp(piecewise.size(motion))[1]
-    unit = grain / np.sqrt(piecewise.energy)
+def rounded(motion: Floats, followed: FollowedMotion) -> Floats:
+    """A motion (2 n,), rounded to a power of two, `Tolerances.grain` of its size."""
+    grain = followed.tolerances.grain * 2.0 ** math.frexp(followed.size(motion))[1]
+    unit = grain / np.sqrt(followed.energy)
     return np.asarray(np.round(motion / unit) * unit + 0.0)  # no negative zeros: bytes are compared
 
 

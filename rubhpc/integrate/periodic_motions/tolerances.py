@@ -15,6 +15,12 @@ class Tolerances:
         Residual, over the size of the motion, at which it is periodic.
     enough : float
         The same, where no further step makes it less.
+    divides : float
+        Distance, over the size, of sections that close after a part of a period.
+    derivative : float
+        How far from the motion its derivative is found, over the size.
+    grain : float
+        Part of the size to which a motion that cases share is rounded: searches differ by less.
     rounding : float
         Residual below which a search without progress may go on.
     same : float
@@ -33,6 +39,9 @@ class Tolerances:
 
     closed: float
     enough: float
+    divides: float
+    derivative: float
+    grain: float
     rounding: float
     same: float
     half: float
@@ -45,6 +54,9 @@ class Tolerances:
 TO_ROUNDING = Tolerances(
     closed=1e-10,
     enough=1e-10,
+    divides=1e-7,
+    derivative=0.0,
+    grain=2.0**-20,
     rounding=1e-8,
     same=1e-6,
     half=1e-7,
@@ -61,6 +73,9 @@ TO_ROUNDING = Tolerances(
 BY_STEPS = Tolerances(
     closed=1e-8,
     enough=1e-6,
+    divides=1e-4,
+    derivative=1e-5,
+    grain=2.0**-14,
     rounding=1e-6,
     same=1e-5,
     half=1e-5,

@@ -12,8 +12,7 @@ from rubhpc.integrate.transient import idle_of
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.marches.event_driven import EventDrivenMarch
-    from rubhpc.integrate.marches.modal import Place
+    from rubhpc.integrate.marches.modal import ModalMarch, Place
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.periodic_motions.solved_motion import SolvedMotion
     from rubhpc.study.study import Recording
@@ -28,7 +27,7 @@ KEPT = LEADING * LONGEST_PERIOD  # revolutions whose ends are kept
 class Passed(NamedTuple):
     """A finished transient, or the end of the case in it."""
 
-    march: EventDrivenMarch  # from which the case continues
+    march: ModalMarch  # from which the case continues
     reason: str | None  # why it cannot continue
     n_revolution: int  # simulated
     n_step: int  # steps before the march was begun anew
@@ -40,7 +39,7 @@ class TransientCase:
 
     Attributes
     ----------
-    march : EventDrivenMarch
+    march : ModalMarch
     n_revolution, n_step : int
         Revolutions simulated, and steps before the last restart of the march.
     passed : (k, 2 n)
@@ -49,12 +48,12 @@ class TransientCase:
         Present states of the pairs.
     """
 
-    def __init__(self, march: EventDrivenMarch, recording: Recording) -> None:
+    def __init__(self, march: ModalMarch, recording: Recording) -> None:
         """Start at the beginning of a march."""
         self.march, self._recording = march, recording
         self._idle = idle_of(march)
         self.n_revolution = self.n_step = 0
-        self.states = march.mask
+        self.states = march.pair_states
         self.passed = march.motion()[np.newaxis]
         self._place: tuple[ModalSetup, Place] | None = None  # where to begin before continuing
 
@@ -73,7 +72,10 @@ class TransientCase:
             self.n_revolution, left = self.n_revolution + now, left - now
             if reason is not None:
                 return reason
-            self.passed, self.states = np.concatenate([self.passed, sections])[-KEPT - 1 :], self.march.mask
+            self.passed, self.states = (
+                np.concatenate([self.passed, sections])[-KEPT - 1 :],
+                self.march.pair_states,
+            )
         return None
 
     def continue_at(self, setup: ModalSetup, place: Place) -> None:

@@ -10,17 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import null_space
 
-from rubhpc.integrate.reduced_model.products import expanded, real_times, times_real
-from rubhpc.integrate.reduced_model.secular_modes import FEWEST, Contact
 from rubhpc.integrate.reduced_model.system_modes import count_modes, modes_of, parts_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
-    from rubhpc.integrate.reduced_model.secular_modes import Within
     from rubhpc.integrate.reduced_model.system_modes import Solved
 
     Floats = NDArray[np.float64]
@@ -69,14 +64,13 @@ def solve_contact_mode(
     force_direction: Floats,
     mask: int,
     known: Solved | None = None,
-    opened: Within | None = None,
 ) -> ContactMode:
     """Solve the linear system with the pairs of `mask` closed.
 
     With J the gap Jacobian and F the contact-force directions of the closed pairs, closed gaps confine the
     motion to `x = x0 + T y` with `J T = 0`. The equations are projected on L with `L^T F^T = 0`, which
     removes the contact forces. These follow from zero accelerations of the gaps (the constraint of Eq. 18 of
-    the paper, differentiated twice). `opened` are the bodies with every pair open.
+    the paper, differentiated twice).
 
     Raises
     ------
@@ -91,8 +85,7 @@ def solve_contact_mode(
     if closed.size:
         offset[closed] = _closing(rate.tobytes(), *rate.shape)
     n_free = tangent.shape[1]
-    contacts = list(map(Contact, rate, force.T))
-    exponent, moved, inverse = confined_modes(tangent, system, contacts, opened, known)
+    exponent, shape, inverse = modes_of(system, known)
     phasor = reduced.force[0] - 1j * reduced.force[1]
     lower = np.concatenate([np.zeros(n_free), project @ phasor])
     response = steady_response(system, reduced.spin, lower, q)
@@ -103,45 +96,22 @@ def solve_contact_mode(
     expand = np.zeros((2 * n, 2 * n_free))
     expand[:n, :n_free] = expand[n:, n_free:] = tangent
     still = constant @ expand.T + np.hstack([offset, np.zeros((q, n))])  # (q, 2 n)
-    motion = np.hstack([moved, (expand @ response)[:, None], still.T])
+    motion = np.hstack([expand @ shape, (expand @ response)[:, None], still.T])
     clear = np.hstack([np.zeros((q, exponent.size + 1)), np.eye(q)])
     switch = gap_jacobian @ motion[:n] + clear
     if closed.size:
         reaction = np.linalg.solve(rate @ force, rate)
-        switch[closed] = reaction @ real_times(np.hstack([reduced.stiffness, reduced.damping]), motion)
+        switch[closed] = reaction @ (np.hstack([reduced.stiffness, reduced.damping]) @ motion)
         switch[closed, exponent.size] -= reaction @ phasor
     entry = constant + np.hstack([offset @ tangent, np.zeros((q, n_free))])
     return ContactMode(
         mask=mask,
         exponent=np.concatenate([exponent, [1j * reduced.spin], np.zeros(q)]),
         motion=motion,
-        enter=expanded(tangent, inverse.T).T,
+        enter=inverse @ expand.T,
         take_off=np.vstack([inverse @ response.real, -inverse @ response.imag, entry @ inverse.T]),
         switch=switch,
     )
-
-
-def confined_modes(
-    tangent: Floats,
-    system: Floats,
-    contacts: Sequence[Contact],
-    opened: Within | None,
-    known: Solved | None,
-) -> tuple[Complexes, Complexes, Complexes]:
-    """Exponents (m,), motions (2 n, m) and inverse by the coordinates of `tangent` (m, 2 n_free).
-
-    `system` is that of these coordinates. `contacts` distinguish it from the system of the bodies `opened`,
-    from whose eigenmodes a large one is solved.
-    """
-    n, n_free = tangent.shape
-    is_large = n_free**2 >= FEWEST**2 * len(contacts)
-    found = opened.with_contacts(contacts) if opened and contacts and is_large else None
-    if found is None:
-        exponent, shape, inverse = modes_of(system, known)
-        return exponent, expanded(tangent, shape), inverse
-    motion = np.vstack([found.shape, found.shape * found.exponent])
-    halves = [times_real(found.inverse[:, :n], tangent), times_real(found.inverse[:, n:], tangent)]
-    return found.exponent, motion, np.hstack(halves)
 
 
 def steady_response(system: Floats, spin: float, load: Complexes, q: int) -> Complexes:

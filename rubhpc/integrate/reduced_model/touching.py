@@ -13,8 +13,6 @@ from rubhpc.integrate.reduced_model import reduction
 from rubhpc.integrate.reduced_model.contact_mode import solve_contact_mode
 from rubhpc.integrate.reduced_model.coupling import coupled_rows
 from rubhpc.integrate.reduced_model.mode_tables import Energies, energies_of, energy_forms
-from rubhpc.integrate.reduced_model.products import real_times
-from rubhpc.integrate.reduced_model.secular_modes import Closings, Eigenmodes, Within
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -150,16 +148,6 @@ class OpenBodies:
         found.loss[row[are_spared], column[are_spared]] = value[are_spared]
         return found
 
-    def within(self, rows: Ints | None = None) -> Within:
-        """The bodies of these coordinates, by default all, for closing contacts among them."""
-        return self._closings.within(np.arange(len(self._part)) if rows is None else rows)
-
-    @cached_property
-    def _closings(self) -> Closings:
-        n, m = len(self._part), self.opened.n_eigenmode
-        exponent, shape = self.opened.exponent[:m], self.opened.motion[:n, :m]
-        return Closings(Eigenmodes(exponent, shape, self.opened.enter[:m]), self._part)
-
     @cached_property
     def _opened_loss(self) -> tuple[Ints, Floats]:
         """Places (2, k) and values of the nonzero energies of the open set."""
@@ -200,14 +188,12 @@ def mode_among(
     closed, (q, n) = pairs.closed(mask), pairs.gap_jacobian.shape
     touching = among.touching(closed) if among and closed else None
     if among is None or touching is None:
-        bodies = among.within() if among else None
-        return solve_contact_mode(reduced, pairs.gap_jacobian, pairs.force_direction, mask, known, bodies)
-    model, bodies = touching.model(reduced), among.within(touching.rows)
+        return solve_contact_mode(reduced, pairs.gap_jacobian, pairs.force_direction, mask, known)
     rates, forces = touching.of_pairs(pairs.gap_jacobian), touching.of_pairs(pairs.force_direction)
-    own = solve_contact_mode(model, rates, forces, (1 << len(closed)) - 1, known, bodies)
+    own = solve_contact_mode(touching.model(reduced), rates, forces, (1 << len(closed)) - 1, known)
     mode = replace(touching.among_all(own, among.opened, n, q), mask=mask)
     others = np.setdiff1d(np.arange(q), closed)
-    mode.switch[others] = real_times(pairs.gap_jacobian[others], mode.motion[:n])
+    mode.switch[others] = pairs.gap_jacobian[others] @ mode.motion[:n]
     mode.switch[others, mode.n_eigenmode + 1 + others] += 1.0
     return mode
 

@@ -4,7 +4,6 @@ import math
 import re
 import time
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -16,16 +15,17 @@ from rubhpc import State
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import steady_response
+from rubhpc.integrate.carried_tangent import CarriedTangent
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.marches import event_driven as event_driven_march
 from rubhpc.integrate.marches import march, met_modes
 from rubhpc.integrate.marches.collocation import WHY
 from rubhpc.integrate.marches.march import NO_FORCES
 from rubhpc.integrate.measuring.divergence import energy_limit
+from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.reduced_model import mode_library
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
 from rubhpc.integrate.setup import prepare
-from rubhpc.integrate.tangent_motion import TangentMotion
 from rubhpc.kernels.case_progress import CONTACT_UNSOLVED
 from rubhpc.kernels.collocation.structures import JAMMED
 from rubhpc.recent import forget
@@ -107,10 +107,6 @@ def test_little_memory_holds_other_tables_between_records(monkeypatch, law, few)
     assert crowded.peak_contact_force == pytest.approx(usual.peak_contact_force, rel=1e-7)
 
 
-def _started(setup, state):
-    return event_driven_march.EventDrivenMarch(setup, 40e-6, 0.2, state, None)
-
-
 def test_neighbours_do_not_depend_on_what_is_forgotten(monkeypatch):
     """Not even their last bits: other cases, which other ranks compute, fill the same tables."""
     monkeypatch.setattr(met_modes, "MOST_REFILLS", 1000)
@@ -120,9 +116,7 @@ def test_neighbours_do_not_depend_on_what_is_forgotten(monkeypatch):
         setup = prepare(
             trial_rig(3), SPEED, contact=Contact(), integrator=Integrator(), samples_per_revolution=64
         )
-        neighbours = TangentMotion(
-            partial(_started, setup), State.at_rest(setup.model), setup, Recording(samples_per_revolution=64)
-        )
+        neighbours = CarriedTangent(PiecewiseMotion(setup, 40e-6, 0.2, State.at_rest(setup.model)))
         ratios.append([neighbours.part(1) for _ in range(6)])
     assert None not in ratios[0]
     assert ratios[0] == ratios[1]

@@ -11,12 +11,13 @@ from impact_map import RESTITUTION, next_impact
 from scipy.optimize import fsolve
 
 from rubhpc import LumpedStator, Rig, State, Unbalance
+from rubhpc.integrate.carried_tangent import CarriedTangent
 from rubhpc.integrate.lyapunov import N_ALIGNING, Growth, Marches
 from rubhpc.integrate.marches.central_difference import CentralDifferenceMarch
 from rubhpc.integrate.marches.collocation import CollocationMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
+from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.setup import prepare
-from rubhpc.integrate.tangent_motion import TangentMotion
 from rubhpc.schema import REGIME
 from rubhpc.study.study import Integrator, Recording
 
@@ -63,8 +64,11 @@ def growth_of(rig, given, state, n_span, march=EventDrivenMarch):
     start = partial(march, setup, given["clearance"], given["friction"], check=None)
 
     def begin():
-        beside = TangentMotion if march is EventDrivenMarch else Marches
-        neighbours = beside(lambda initial: start(initial=initial), state, setup, recording)
+        if march is EventDrivenMarch:
+            motion = PiecewiseMotion(setup, given["clearance"], given["friction"], state)
+            neighbours = CarriedTangent(motion)
+        else:
+            neighbours = Marches(lambda initial: start(initial=initial), state, setup, recording)
         neighbours.most_spans = n_span + N_ALIGNING
         return neighbours
 
@@ -110,9 +114,10 @@ def test_impacts_take_their_share_of_the_phase_space():
 
 
 def test_every_integrator_finds_one_exponent():
-    """Period 1 of the packaged rig: 0.529 per revolution, the central difference in steps of 2 us.
+    """Period 1 of the packaged rig: 0.524 per revolution, the central difference in steps of 2 us.
 
-    Complex multipliers: the growth goes up and down with the angle of the displacement.
+    Complex multipliers: the growth goes up and down with the angle of the displacement, so that spans at both
+    ends of a mean have less weight.
     """
     given = {"speed_ratio": 0.75, "clearance": 84e-6, "friction": 0.3, "samples_per_revolution": 64}
     record = simulate("mokhtar2017", **given, revolutions=1)
@@ -121,8 +126,9 @@ def test_every_integrator_finds_one_exponent():
         name: growth_of(read_rig("mokhtar2017"), given, record.final, 14, march)
         for name, march in MARCHES.items()
     }
+    mean = {name: np.average(growth, weights=np.bartlett(16)[1:-1]) for name, growth in found.items()}
     for name in ("collocation", "central-difference"):
-        assert found[name].mean() == pytest.approx(found["modal"].mean(), rel=0.01), name
+        assert mean[name] == pytest.approx(mean["modal"], rel=0.01), name
 
 
 @pytest.mark.parametrize(

@@ -116,12 +116,10 @@ def test_sum_is_the_trace_of_the_flow_between_impacts_and_in_contact(contact, da
         samples_per_revolution=64,
     )  # fmt: skip
     begun = replace(State.at_rest(setup.model), rotor_velocity=np.array([0.3]))
-    motion = followed_motion(setup)(setup, 1e-12, 0.0, begun)
+    motion = followed_motion(setup.scheme)(setup, 1e-12, 0.0, begun)
     found = exponents(motion, 2, aligning=0, followed=100)
-    at, states, pressed, n_event, logarithm = motion.start, motion.states, 0.0, 0, 0.0
-    for _ in range(100):
-        revolution = motion.revolve(at, states)
-        at, states = revolution.end, revolution.states
+    pressed, n_event, logarithm = 0.0, 0, 0.0
+    for revolution in motion.follow(motion.start, motion.states, 100):
         n_event += len(revolution.pieces) - 1
         pressed += sum(piece.duration for piece in revolution.pieces if piece.states != 0)
         if "restitution" in contact:

@@ -21,7 +21,7 @@ CASE = {"speed_ratio": 0.75, "clearance": "84 um", "friction": 0.3, "transient":
     [
         ({"most_events": 1}, "more than 1 events in a revolution"),
         ({"most_residual": 1e-12}, "the initial state is far from periodic, residual "),
-        ({"most_iterations": 1}, "no convergence within 1 iterations, residual "),
+        ({"most_iterations": 1}, "no convergence within 1 iterations at a residual of "),
     ],
 )
 def test_limit_that_is_reached_is_named(monkeypatch, limit, text):

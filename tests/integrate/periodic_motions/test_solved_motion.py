@@ -10,6 +10,7 @@ from closed_form import Contact, read_rig, simulate
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.periodic_motions.approach import Approach
 from rubhpc.integrate.periodic_motions.solved_motion import MOST_KEPT, SolvedMotions, rounded, solved_motions
+from rubhpc.integrate.periodic_motions.tolerances import TO_ROUNDING
 from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import with_keys
 from rubhpc.schema import REGIME
@@ -90,7 +91,7 @@ def test_motions_of_another_operating_point_take_their_place():
 
 SPRING = SimpleNamespace(
     energy=np.array([100.0, 1.0]), size=lambda x: math.hypot(10.0 * x[0], x[1]), n=1,
-    setup=SimpleNamespace(spin=10.0), bodies=SimpleNamespace(stiffness=np.eye(1)),
+    tolerances=TO_ROUNDING,
 )  # fmt: skip
 
 
@@ -135,6 +136,24 @@ def test_stable_are_multipliers_within_the_unit_circle(size, angle):
     random = np.random.default_rng(1).standard_normal((5, 5))
     approach = Approach(random @ matrix @ np.linalg.inv(random), np.ones(5))
     assert approach.is_stable == (size < 1.0)
-    if approach.is_stable:
-        found = approach.multiplier
-        assert abs(found.real + 1j * abs(found.imag) - size * np.exp(1j * angle)) < 1e-7 * size
+
+
+def test_distances_are_the_energies_of_all_periods_to_come():
+    """Of a matrix of low rank whose largest multipliers are a pair of modulus 0.97, in unlike components."""
+    random, n = np.random.default_rng(5), 12
+    block = np.zeros((n, n))
+    block[:2, :2] = 0.97 * np.array([[np.cos(0.4), -np.sin(0.4)], [np.sin(0.4), np.cos(0.4)]])
+    block[2:7, 2:7] = np.diag(np.linspace(0.1, 0.9, 5))
+    basis, scale = np.eye(n) + 0.2 * random.standard_normal((n, n)), np.repeat([1e4, 1.0], n // 2)
+    matrix = basis @ block @ np.linalg.inv(basis) * scale / scale[:, np.newaxis]
+    moved = apart = np.cos(np.arange(n)) / scale
+    total = 0.0
+    for _ in range(1200):
+        total += scale**2 @ moved**2
+        moved = matrix @ moved
+    approach = Approach(matrix, scale**2)
+    assert approach.is_stable
+    assert approach.squares(apart[np.newaxis]) == pytest.approx([total], rel=1e-10)
+    for largest in (1.0, 1.001, 1e3, 1e60):
+        assert not Approach(largest / 0.97 * matrix, scale**2).is_stable
+    assert Approach(0.0 * matrix, scale**2).is_stable

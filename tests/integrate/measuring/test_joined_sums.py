@@ -1,12 +1,10 @@
-"""Sums and samples of a record that repeats a period, against a record that is added up step by step."""
+"""Sums of a record in parts, against a record that is added up step by step."""
 
 import numpy as np
 import pytest
-from trial_rig import trial_rig
 
-from rubhpc.fem.assemble import assemble
-from rubhpc.integrate.marched_record import Part, repeated_samples, repeated_sums
-from rubhpc.integrate.measuring.samples import empty_samples, new_accumulator
+from rubhpc.integrate.marched_record import joined_sums
+from rubhpc.integrate.measuring.samples import new_accumulator
 
 Q = 2
 
@@ -43,32 +41,12 @@ def taken(steps, sense=0):
 
 
 @pytest.mark.parametrize("seed", range(20))
-@pytest.mark.parametrize(("n_over", "n_whole"), [(0, 1), (0, 4), (2, 1), (1, 3), (6, 2)])
-def test_sums_are_those_of_all_steps(seed, n_over, n_whole):
+def test_sums_are_those_of_all_steps(seed):
     steps = steps_of(np.random.default_rng(seed), 7)
-    whole = taken(n_whole * steps + steps[:n_over])
-    if n_over:
-        first = taken(steps[:n_over])
-        parts = [
-            Part(None, first, n_whole + 1),
-            Part(None, taken(steps[n_over:], first.sense), n_whole),
-        ]
-    else:
-        parts = [Part(None, taken(steps), n_whole)]
-    found = repeated_sums(parts)
+    parts, sense = [], 0
+    for first, last in ((0, 2), (2, 3), (3, 7)):
+        parts.append(taken(steps[first:last], sense))
+        sense = parts[-1].sense
+    whole, found = taken(steps), joined_sums(parts)
     for name in set(whole._fields) - {"sense", "is_touching", "force_piece", "force_held", "origin"}:
         assert getattr(found, name) == pytest.approx(getattr(whole, name), rel=1e-13), name
-
-
-@pytest.mark.parametrize("n_sample", [3, 7, 16])
-def test_samples_follow_one_another(n_sample):
-    model = assemble(trial_rig(2))
-    parts = []
-    for first, n in ((0, 3), (3, 4)):
-        samples = empty_samples(model.n_place, n)
-        samples.whole[:] = np.arange(first, first + n) + 10.0 * np.arange(len(samples.whole))[:, np.newaxis]
-        parts.append(Part(samples, None, 1))
-    found = repeated_samples(parts, n_sample, model)
-    expected = np.arange(n_sample) % 7
-    assert found.whole[3].tolist() == (30.0 + expected).tolist()
-    assert found.axial[1].tolist() == (50.0 + expected).tolist()
