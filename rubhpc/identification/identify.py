@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
 LIVE, DRAWS = 100, 1000
 # Of a hypothesis of which the evidence is asked: it has half the live points.
-FEWEST = 10  # live points
+FEWEST = 30  # of these: bounds around fewer hold few points that are accepted
 MOST_OF_OTHERS = 40  # evaluations a live point: one that fits badly has no end of small peaks
 POSTERIOR, CASES = "posterior.nc", "cases"
 
