@@ -51,7 +51,7 @@ def in_words(found: Found, tree: xr.DataTree) -> Iterator[str]:
     best = max(evidence, key=lambda name: evidence[name][0])
     for one, sampled in ((problem.rub, found.rub), *found.others.items()):
         if not sampled.is_whole and sampled.log_likelihoods.max() > evidence[best][0] - _SURE:
-            fix = "it may explain more than was found; narrow the priors"
+            fix = "it may explain more than was found; narrow the priors or raise --live"
             yield f"{one.name}: the sampling was ended after {sampled.n_call} cases; {fix}"
     if problem.rub.name not in evidence:
         yield "no case of [grid] touches, so that a rub has not been tried; lower the clearance"
