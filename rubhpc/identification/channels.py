@@ -116,7 +116,7 @@ def channels_of(measured: xr.Dataset) -> Channels:
 
     Signals with the name of a stored one are that; those of a stator are of the first. Of two probes whose
     orbit is derived the probes themselves are used. Signals that are constant are left out, and those that
-    fade while others do not, as of a broken sensor.
+    change their size while others do not, as of a broken sensor.
 
     Raises
     ------
@@ -161,7 +161,7 @@ def channels_of(measured: xr.Dataset) -> Channels:
     if not is_steady.any():
         fix = "give a part of the record in which it does not"
         raise InputError(f"{where}: the size of the motion changes by more than a factor of 3; {fix}")
-    faded = [name for name, steady in zip(names, is_steady, strict=True) if not steady]
+    unsteady = [name for name, steady in zip(names, is_steady, strict=True) if not steady]
     names, simulated = (list(compress(one, is_steady)) for one in (names, simulated))
     spin = float(measured["spin_speed"])
     rate = float(measured.attrs.get("rate", math.inf))
@@ -184,7 +184,7 @@ def channels_of(measured: xr.Dataset) -> Channels:
         highest_order=seen,
         angle_error=angle_error,
         note="\n".join(
-            f"{where}: {name}: fades to less than a third within the record; left out" for name in faded
+            f"{where}: {name}: changes its size by more than a factor of 3; left out" for name in unsteady
         ),
     )
 

@@ -272,7 +272,7 @@ def test_broken_sensors_are_left_out(tmp_path):
     problem = read_problem(*rubbing_machine.write(tmp_path, columns))
     assert problem.channels.names == ("vertical",)
     assert "column torsion: is -0.3 throughout; check the sensor" in problem.note
-    assert "horizontal: fades to less than a third within the record; left out" in problem.note
+    assert "horizontal: changes its size by more than a factor of 3; left out" in problem.note
     columns["vertical"][columns["time"].size // 3 :] *= 0.1
     with pytest.raises(InputError, match="the size of the motion changes by more than a factor of 3"):
         read_problem(*rubbing_machine.write(tmp_path, columns))
