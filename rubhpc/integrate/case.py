@@ -23,7 +23,7 @@ from rubhpc.integrate.measuring.divergence import diverged_record
 from rubhpc.integrate.measuring.measures import measures_of
 from rubhpc.integrate.measuring.monitors import carrier_displacement, monitored
 from rubhpc.integrate.measuring.orbit_measures import period
-from rubhpc.integrate.measuring.regimes import LASTING, by_growth, regime
+from rubhpc.integrate.measuring.regimes import LASTING, by_growth, regime, undecided
 from rubhpc.integrate.measuring.rub_in_bores import rub_measures
 from rubhpc.integrate.measuring.samples import (
     add_sag,
@@ -80,6 +80,8 @@ class Case:
     ----------
     look : callable
         Called with a march between its kernel calls, if any.
+    is_judged : bool
+        Whether its regime is found; else it is undecided.
     """
 
     setup: Setup
@@ -88,6 +90,7 @@ class Case:
     friction: float
     recording: Recording
     look: Callable[[March], None] | None = None
+    is_judged: bool = True
 
     def march(self, state: State, setup: Setup | None = None) -> March:
         """Start a march from a state, of this set-up or of another one."""
@@ -122,6 +125,7 @@ def run_case(
     check: Callable[[], None] | None = None,
     say: Callable[[str], None] = lambda _: None,
     note: Callable[[float], None] = lambda _: None,
+    is_judged: bool = True,
 ) -> Record:
     """Integrate one case and measure it.
 
@@ -140,6 +144,8 @@ def run_case(
         Called with the progress of the case as often as `check`, if that is given.
     note : callable
         Called before each `check` with the share of transient and record that is done; 1 after the record.
+    is_judged : bool
+        Whether the regime is found, which may take longer than the record; else it is undecided.
     """
     n_whole = recording.longest_transient + recording.revolutions
     began = time.perf_counter() - seconds_compiling()
@@ -162,6 +168,7 @@ def run_case(
         friction=friction,
         recording=recording,
         look=None if check is None else look,
+        is_judged=is_judged,
     )
     try:
         record = _integrate(case, state)
@@ -335,6 +342,8 @@ def judge_of(case: Case, march: March, final: State, n_event: float) -> Judge:
 
     A march of the case that is needed no more is started again; `n_event` are the events in a revolution.
     """
+    if not case.is_judged:
+        return undecided
     solver = Solver(case.motion, final, cast("ModalMarch", march)) if case.has_tangent else None
 
     def growth_from(state: State) -> Growth:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import weakref
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
@@ -188,8 +189,10 @@ class ModalSetup:
             orders.append(order)
             forced.append(np.concatenate([moved, rate * moved]))
         is_complex, turning = exponent.imag != 0.0, 1j * self.spin
+        # A reference back would keep both, megabytes of tables, until a rare collection of cycles.
+        own = weakref.proxy(self)
         return FlightModes(
-            self, exponent, motion, enter, is_complex, turning, np.array(orders), np.column_stack(forced)
+            own, exponent, motion, enter, is_complex, turning, np.array(orders), np.column_stack(forced)
         )
 
     @cached_property
