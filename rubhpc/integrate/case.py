@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, cast
@@ -37,6 +38,7 @@ from rubhpc.integrate.overlaps import with_overlap
 from rubhpc.integrate.periodic_motions.collocated_motion import followed_motion
 from rubhpc.integrate.periodic_motions.direct import pass_directly
 from rubhpc.integrate.periodic_motions.lyapunov_spectrum import spectrum_of
+from rubhpc.integrate.periodic_motions.piecewise_motion import Unfollowed
 from rubhpc.integrate.periodic_motions.proof import Solver
 from rubhpc.integrate.periodic_motions.solved_motion import SolvedMotion, solved_motions
 from rubhpc.integrate.record import Record, State
@@ -219,7 +221,9 @@ def compile_kernels(
         case = Case(
             setup=setup, scheme=setup.scheme, clearance=clearance, friction=friction, recording=recording
         )
-        Solver(case.motion, record.final)(1)
+        with suppress(NoClosedForm, Unfollowed):
+            motion = case.motion(record.final)
+            motion.go_on(np.eye(2 * motion.n)[:, :1])
 
 
 def _integrate(case: Case, initial: State) -> Record:
