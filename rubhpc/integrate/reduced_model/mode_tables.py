@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from rubhpc.errors import InputError
 from rubhpc.fem.model import FAR_APART
-from rubhpc.integrate.reduced_model.contact_mode import ContactMode
 from rubhpc.kernels import contact_modes as kernel
 from rubhpc.kernels.contact_modes import LANES
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL
 
 if TYPE_CHECKING:
+    from rubhpc.integrate.reduced_model.contact_mode import ContactMode
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
 
     Ints = NDArray[np.int64]
@@ -214,41 +214,6 @@ def tabulate(
     )
     fields: list[Any] = [np.ascontiguousarray(np.asarray(field)[None]) for field in row]
     return kernel.ModeTables(*fields)
-
-
-def bytes_ahead(tables: kernel.ModeTables, reduced: ReducedModel, n_ahead: int, n_level: int) -> int:
-    """Memory that the tables of a mode would take with so many samples ahead, and levels of exponentials."""
-    m = tables.pace.shape[1]
-    n_place = len(reduced.degree) + len(reduced.carrier)
-    n_output = n_ahead * (kernel.N_ROTOR_ROW + 3 * n_place + reduced.probe.shape[1])
-    columns = -(-n_output // LANES) * LANES - tables.output.shape[2]
-    levels = n_level - tables.power_re.shape[1]
-    return int(sum(field.nbytes for field in tables) + 2 * m * (columns + levels) * tables.pace.itemsize)
-
-
-def mode_of(row: kernel.ModeTables, exponents: Floats) -> ContactMode:
-    """Return the contact mode that tables (1, ...) and exponents (`mode_library.ModeLibrary.exponents`) hold.
-
-    The result equals the tabulated mode bit for bit.
-    """
-    m, q = int(row.n_eigenmode[0]), row.enter_constant.shape[1]
-    end = m + 1 + q
-    halves = np.concatenate([row.enter_cosine, row.enter_sine, row.enter_constant[0]])  # (2 + q, 2, m)
-    return ContactMode(
-        mask=int(row.mask[0]),
-        exponent=_joined(exponents[0, :end], exponents[1, :end]),
-        motion=_joined(row.motion_re[0, :, :end], row.motion_im[0, :, :end]),
-        enter=_joined(row.enter_re[0, :, :m], row.enter_im[0, :, :m]).T,
-        take_off=_joined(halves[:, 0, :m], halves[:, 1, :m]),
-        switch=_joined(row.switch_re[0, :, :end], row.switch_im[0, :, :end]),
-    )
-
-
-def _joined(real: Floats, imaginary: Floats) -> Complexes:
-    """Complex numbers of these parts, including the signs of zeros."""
-    joined = np.empty(real.shape, dtype=np.complex128)
-    joined.real, joined.imag = real, imaginary
-    return joined
 
 
 def _outputs(

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from rubhpc.fem.model import Model
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode, SlidingPairs
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
-    from rubhpc.integrate.reduced_model.system_modes import Solved
 
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
@@ -182,15 +181,14 @@ def mode_among(
     reduced: ReducedModel,
     pairs: SlidingPairs,
     mask: int,
-    known: Solved | None,
 ) -> ContactMode:
     """The contact mode of a set of closed pairs, solved for the bodies that touch where there are others."""
     closed, (q, n) = pairs.closed(mask), pairs.gap_jacobian.shape
     touching = among.touching(closed) if among and closed else None
     if among is None or touching is None:
-        return solve_contact_mode(reduced, pairs.gap_jacobian, pairs.force_direction, mask, known)
+        return solve_contact_mode(reduced, pairs.gap_jacobian, pairs.force_direction, mask)
     rates, forces = touching.of_pairs(pairs.gap_jacobian), touching.of_pairs(pairs.force_direction)
-    own = solve_contact_mode(touching.model(reduced), rates, forces, (1 << len(closed)) - 1, known)
+    own = solve_contact_mode(touching.model(reduced), rates, forces, (1 << len(closed)) - 1)
     mode = replace(touching.among_all(own, among.opened, n, q), mask=mask)
     others = np.setdiff1d(np.arange(q), closed)
     mode.switch[others] = pairs.gap_jacobian[others] @ mode.motion[:n]
