@@ -23,7 +23,6 @@ from rubhpc.integrate.changing_speed.mode_courses import (
     matched,
 )
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
-from rubhpc.integrate.reduced_model.mode_tables import energies_of
 from rubhpc.integrate.reduced_model.table_stack import TableStack
 from rubhpc.integrate.reduced_model.touching import OpenBodies, open_bodies
 from rubhpc.kernels.contact_modes import LANES, SAMPLES_AT_ONCE
@@ -37,7 +36,6 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.model import Model
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode
-    from rubhpc.integrate.reduced_model.mode_tables import Energies
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
     from rubhpc.kernels.contact_modes import ModeTables
     from rubhpc.kernels.filling import ModeCourse
@@ -374,11 +372,9 @@ class RangeLibrary(ModeLibrary):
         shape, rate = mode.motion[:n], mode.motion[n:]
         resisting = np.zeros((0, mode.exponent.size), dtype=np.complex128)
         if self._is_measured:
-            reduced, friction = self.reduced, self._friction_of(mode)
+            reduced = self.reduced
             skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
-            resisting = reduced.damping @ rate + skew @ shape
-            if friction is not None:
-                resisting = resisting - friction
+            resisting = reduced.damping @ rate + skew @ shape - self._friction_of(mode)
         else:
             row = with_slip(row, self.slip @ rate, mode.exponent)
         return Node.of(mode, row, self._output, resisting)
@@ -399,10 +395,6 @@ class RangeLibrary(ModeLibrary):
             self._is_open, self._opened = True, self._solve(0)
             self._among = self._among.at(self.reduced, self._opened) if self._among else None
         return super()._solved(mask)
-
-    def _energies_of(self, mode: ContactMode) -> Energies:
-        """Energies of a mode, whose order is not that of open bodies."""
-        return energies_of(mode, self.reduced, self._friction_of(mode), self.width)
 
 
 def _struck(reduced: ReducedModel, phasor: Complexes) -> ReducedModel:

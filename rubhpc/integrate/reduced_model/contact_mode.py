@@ -21,14 +21,6 @@ if TYPE_CHECKING:
     Complexes = NDArray[np.complex128]
 
 
-class Places(NamedTuple):
-    """Places of the arrays of a contact mode of some pairs in that of all bodies."""
-
-    coordinate: Ints  # ascending
-    take_off: Ints  # rows
-    switch: Ints  # rows
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ContactMode:
     """Motion with one set of pairs closed: `x = Re(motion @ z)`, x (2 n,) displacements, then velocities.
@@ -47,13 +39,6 @@ class ContactMode:
     def n_eigenmode(self) -> int:
         """Number of eigenmodes among the coordinates, m."""
         return len(self.enter)
-
-    @classmethod
-    def places(cls, own: int, m: int, q: int, pairs: Ints) -> Places:
-        """Places of `own` eigenmodes and these pairs (r,) among m eigenmodes and q pairs."""
-        return Places(
-            np.concatenate([np.arange(own), [m], m + 1 + pairs]), np.append([0, 1], 2 + pairs), pairs
-        )
 
 
 def solve_contact_mode(

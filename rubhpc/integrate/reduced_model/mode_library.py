@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.reduced_model.mode_tables import Energies
     from rubhpc.integrate.reduced_model.touching import OpenBodies
     from rubhpc.kernels import contact_modes as kernel
 
@@ -27,6 +26,7 @@ if TYPE_CHECKING:
 # Coordinates that a set of several contacts may have beyond any single one. The width is fixed before the
 # first case: it determines the order of sums, and thus the last bits of every case.
 SPARE = 8
+FEW_PAIRS = 5  # with outputs of several samples ahead, which would be a third of the memory of larger tables
 
 
 class ModeLibrary:
@@ -63,6 +63,8 @@ class ModeLibrary:
         self.reduced = reduced
         self._take_pairs(model, friction)
         self._tick, self._sample_level, self._n_level = tick, sample_level, n_level
+        if len(self.gap_jacobian) > FEW_PAIRS:
+            self._n_ahead, self._n_level = 1, sample_level + 1
         self._is_measured = is_measured
         self._opened = opened
         self._among = open_bodies(reduced, model, opened) if among is None else among
@@ -99,9 +101,11 @@ class ModeLibrary:
         return True
 
     def forget(self) -> None:
-        """Make room: keep only the mode with every pair open."""
-        self._tables.clear()
-        self._exponents.clear()
+        """Make room: keep only the mode with every pair open.
+
+        A case that has still to go on with the tables of before keeps them.
+        """
+        self._tables = TableStack(1 + len(self.gap_jacobian))
         self.derived.clear()
         self.masks.clear()
         self._tabulate(self._opened)
@@ -141,16 +145,8 @@ class ModeLibrary:
         """The mode of a set of closed pairs."""
         return mode_among(self._among, self.reduced, self._pairs, mask)
 
-    def _energies_of(self, mode: ContactMode) -> Energies:
-        """Energies of a mode."""
-        friction = self._friction_of(mode)
-        if self._among is None:
-            return energies_of(mode, self.reduced, friction, self.width)
-        closed = self._pairs.closed(mode.mask)
-        return self._among.energies(mode, self.reduced, friction, closed, self.width)
-
-    def _friction_of(self, mode: ContactMode) -> Complexes | None:
-        """Friction forces on the motion with each coordinate of a mode (n, m), N; None: omitted."""
+    def _friction_of(self, mode: ContactMode) -> Complexes:
+        """Friction forces on the motion with each coordinate of a mode (n, m), N."""
         return self._pairs.friction_forces(mode)
 
     def _tabulate(self, mode: ContactMode) -> None:
@@ -169,7 +165,9 @@ class ModeLibrary:
             mode,
             reduced,
             self.slip,
-            energies=self._energies_of(mode) if self._is_measured else None,
+            energies=energies_of(mode, self.reduced, self._friction_of(mode), self.width)
+            if self._is_measured
+            else None,
             width=self.width,
             tick=self._tick,
             sample_level=self._sample_level,

@@ -35,59 +35,26 @@ class Energies(NamedTuple):
     work: NDArray[np.complex128]  # (2, m), J
     steady: Floats  # (2,), W, not contained in the forms
 
-    def add(self, columns: NDArray[np.int64], part: Energies) -> None:
-        """Add the energies of a part of the bodies, which has some of the coordinates."""
-        both = np.concatenate([columns, self.work.shape[1] + columns])
-        self.loss[both[:, None], both] += part.loss
-        self.work[:, columns] += part.work
-        self.steady[:] += part.steady
-
-    def padded(self, width: int) -> Energies:
-        """The same with further coordinates without energy."""
-        found = Energies.none(width)
-        found.add(np.arange(self.work.shape[1]), self)
-        return found
-
     @classmethod
     def none(cls, width: int) -> Energies:
         """Zeros."""
         return cls(np.zeros((2 * width, 2 * width)), np.zeros((2, width), dtype=complex), np.zeros(2))
 
 
-def energies_of(mode: ContactMode, reduced: ReducedModel, friction: Complexes | None, width: int) -> Energies:
-    """Energies of a contact mode, its coordinates padded to `width`.
+def energies_of(mode: ContactMode, reduced: ReducedModel, friction: Complexes, width: int) -> Energies:
+    """Primitives of the powers of damping and unbalance in a contact mode, its coordinates padded to `width`.
 
-    Parameters
-    ----------
-    friction : (n, m), N, optional
-        Friction forces on the motion with each coordinate; their loss is added to that of damping.
+    The loss includes that of `friction` (n, m), N, the friction forces on the motion with each coordinate,
+    whose power is the work of the drive against it less the heat. Products of two coordinates are
+    proportional to exp((l_k + l_j) t) or exp((l_k + conj l_j) t). Terms without a primitive are steady: the
+    product of the unbalance response with itself, and those of undamped modes, which have no loss.
     """
-    spare = width - mode.exponent.size
-    exponent, motion = np.pad(mode.exponent, (0, spare)), np.pad(mode.motion, ((0, 0), (0, spare)))
-    rubbing = np.zeros((len(motion) // 2, width), dtype=complex)
-    if friction is not None:
-        rubbing[:, : mode.exponent.size] = friction
-    return energy_forms(reduced, exponent, motion, rubbing, mode.n_eigenmode)
-
-
-def energy_forms(
-    reduced: ReducedModel,
-    exponent: Complexes,
-    motion: Complexes,
-    friction: Complexes,
-    n_eigenmode: int,
-) -> Energies:
-    """Primitives of the powers of damping and unbalance.
-
-    The loss includes that of `friction` (n, m), whose power on the motion is the work of the drive against it
-    less the heat. Products of two coordinates are proportional to exp((l_k + l_j) t) or exp((l_k + conj l_j)
-    t). Terms without a primitive are steady: the product of the unbalance response with itself, and those of
-    undamped modes, which have no loss.
-    """
-    n = reduced.stiffness.shape[0]
+    spare, response = width - mode.exponent.size, mode.n_eigenmode
+    exponent = np.pad(mode.exponent, (0, spare))
+    shape, rate = np.split(np.pad(mode.motion, ((0, 0), (0, spare))), 2)
+    rubbing = np.pad(friction, ((0, 0), (0, spare)))
     skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
-    shape, rate = motion[:n], motion[n:]
-    resisting = reduced.damping @ rate + skew @ shape - friction
+    resisting = reduced.damping @ rate + skew @ shape - rubbing
     phasor = reduced.force[0] - 1j * reduced.force[1]
     turning = np.full(exponent.shape, 1j * reduced.spin)
     powers = rate.T @ resisting, rate.T @ resisting.conj()
@@ -98,10 +65,7 @@ def energy_forms(
             _primitive(phasor.conj() @ rate, exponent - turning),
         ]
     )
-    steady = np.zeros(2, dtype=complex)
-    if exponent.size > n_eigenmode:
-        response = rate[:, n_eigenmode]
-        steady[:] = response @ resisting[:, n_eigenmode].conj(), response @ phasor.conj()
+    steady = rate[:, response] @ np.stack([resisting[:, response], phasor], axis=1).conj()
     return Energies(loss, work, 0.5 * steady.real)
 
 
