@@ -19,7 +19,7 @@ _FLOATS = np.dtype(np.float64)
 MOST_MODES = 1024  # sets of closed contacts of one speed and friction
 FIRST_ROOM = 2  # for a contact-free case and one that enters a contact
 NEXT_ROOM = 16  # for a case that keeps rubbing; then for all, because growing copies
-MOST_BYTES = 2**31  # of their tables
+MOST_BYTES = 3 * 2**30  # of their tables
 _KEPT = 2**24  # bytes of an array up to which the C library keeps freed memory
 
 # It takes arrays smaller than the largest freed one from its heap, which keeps twice as much (mallopt(3)).
