@@ -131,7 +131,9 @@ def key_tables(tables: dict[str, type]) -> str:
     sections = []
     for title, owner in tables.items():
         about = (inspect.getdoc(owner) or "").split("\n\n")[0].replace("\n", " ")
-        rows = [_key_row(field) for field in dataclasses.fields(owner) if "kind" in field.metadata]
+        refused = getattr(owner, "REFUSED", ())
+        fields = [field for field in dataclasses.fields(owner) if field.name not in refused]
+        rows = [_key_row(field) for field in fields if "kind" in field.metadata]
         head = f"## {title}" if "[" not in title else "## " + re.sub(r"(\[+[\w.]+\]+)", r"`\1`", title)
         sections.append(f"{head}\n\n{about}\n\n{_table(_KEY_HEAD, rows)}")
     return "\n\n".join(sections)

@@ -117,6 +117,8 @@ def _tracked(keys: MeasuredKeys, path: Path) -> Record:
     for signal in keys.signals:
         column = record.values[signal.column]
         values = by_angle(column, record.step, turning, first + low, first + high, n)
+        if not np.ptp(column):
+            values[:] = column[0]  # without the rounding of the filter
         offset = signal.offset
         if offset is None:
             offset = float((values if found.is_steady else values[: _START * n]).mean())

@@ -35,7 +35,7 @@ from rubhpc.recent import recent
 from rubhpc.running.ending import ended_together
 from rubhpc.schema import DONE
 from rubhpc.study.axes import SPEED_AXES
-from rubhpc.study.identity import physics_of
+from rubhpc.study.identity import PHYSICS
 from rubhpc.study.study import study_of, table_of
 from rubhpc.threads import on_one_thread
 
@@ -146,12 +146,11 @@ def rank_of(trial: Trial) -> Ranked:
 
 def _name(trial: Trial, known: Known) -> str:
     """Name of the file of a trial, by all that its result depends on."""
-    study = study_of(known.table | {"grid": known.at_medians}, Path(trial.study), trust_rig=trial.trust_rig)
     content = [
         asdict(trial) | {"study": "", "output": ""},
         known.table,
         known.rig.as_dict(),
-        physics_of(study),
+        PHYSICS,
     ]
     key = hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()[:16]
     return f"noise-{trial.noise:g}-{trial.draw}-{key}"

@@ -1,7 +1,7 @@
 """What may be behind a measurement: machines with rub, without it, and with misalignment.
 
 Without contact a machine is linear, and its steady motion is that of unbalance and harmonics. Misalignment
-adds what a coupling at the first node of the shaft does at twice the speed: a force that rotates forward, one
+adds what couplings at the ends of the shaft do at twice the speed: at each a force that rotates forward, one
 that rotates backward and, where torsion is measured, a torque, of any size and phase. Since the machine is
 linear these are integrated over in closed form.
 """
@@ -113,6 +113,7 @@ def simulated(
         friction=case.friction,
         recording=study.recording,
         initial=case.initial,
+        is_judged=False,
     )
 
 
@@ -269,26 +270,29 @@ class NoRub:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Misalignment(NoRub):
-    """The same with a misaligned coupling at the first node of the shaft, whose forces are unknown."""
+    """The same with misaligned couplings at the ends of the shaft, whose forces are unknown."""
 
     name: str = "misalignment"
 
     def unknown(self, values: Sequence[float]) -> Unknown | None:
         """Return the forces and the torque, as lines in the channels of one weight of the rotor."""
         model, spin = self.model(values)
-        upright = [i for i, (_, name) in enumerate(model.rotor.degrees) if name == "v"]
-        weight = _GRAVITY * float(model.rotor.mass[np.ix_(upright, upright)].sum())
-        first = response_nodes(model)[0]
-        rows = [model.rotor.index(first, name) for name in ("v", "w")]
-        forces = np.zeros((2, model.rotor.n_dof), dtype=np.complex128)
-        for row, factors in zip(rows, ((1.0, 1.0), (-1j, 1j)), strict=True):
-            if row >= 0:
-                forces[:, row] = weight * np.array(factors)  # forward and backward
+        weight = _GRAVITY * mass_of(model)
+        turning = {"v": (1.0, 1.0), "w": (-1j, 1j)}  # forward and backward
+        bending = sorted({node for node, name in model.rotor.degrees if name == "thy"})  # no pedestals
+        nodes = bending or response_nodes(model)
+        forces = []
+        for node in dict.fromkeys((nodes[0], nodes[-1])):
+            of_node = np.zeros((2, model.rotor.n_dof), dtype=np.complex128)
+            for name, factors in turning.items():
+                if (row := model.rotor.index(node, name)) >= 0:
+                    of_node[:, row] = weight * np.array(factors)
+            forces += list(of_node)
         twisting = [i for i, (_, name) in enumerate(model.rotor.degrees) if name == "thx"]
         if twisting and any(unit.startswith("rad") for unit in self.machine.channels.units):
-            torque = np.zeros((1, model.rotor.n_dof), dtype=np.complex128)
-            torque[0, twisting[0]] = weight * max(stator.radius for stator in model.stators)
-            forces = np.concatenate([forces, torque])
+            torque = np.zeros(model.rotor.n_dof, dtype=np.complex128)
+            torque[twisting[0]] = weight * max(stator.radius for stator in model.stators)
+            forces.append(torque)
         moved = [harmonic_response(model, spin, _TWICE, force) for force in forces]
         shapes = np.stack([self.machine.lines(model, spin, _TWICE, one) for one in moved], axis=1)
         return Unknown(_TWICE, shapes, _FORCES)
@@ -297,12 +301,10 @@ class Misalignment(NoRub):
 Hypothesis = Rub | NoRub
 
 
-def hypotheses_of(machine: Machine, comparison: Comparison) -> tuple[Rub, tuple[NoRub, ...]]:
-    """Return the rub, and all else that is tried."""
-    return (
-        Rub(machine=machine, comparison=comparison),
-        tuple(kind(machine=machine, comparison=comparison) for kind in (NoRub, Misalignment)),
-    )
+def mass_of(model: Model) -> float:
+    """Return the mass of the rotor, kg."""
+    upright = [i for i, (_, name) in enumerate(model.rotor.degrees) if name == "v"]
+    return float(model.rotor.mass[np.ix_(upright, upright)].sum())
 
 
 def _is_of_rotor(name: str) -> bool:

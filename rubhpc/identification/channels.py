@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations
+from itertools import combinations, compress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,6 +32,8 @@ _ANGLES = {"vertical": 0.0, "horizontal": 0.5 * math.pi}
 _POINTING = math.radians(1.0)  # by which the direction of a key-phasor is known
 _PLACED = 0.3  # of a sample, by which its pulses are placed (standard deviation)
 _DEAD = 1e-9  # of the largest value: a signal that varies by less is constant
+_PARTS = 4  # of a record, in which signals have about the same size
+_FADED = 1 / 3  # of the largest rms of a part
 _SLIP = 0.02  # by which a speed that is given may be wrong
 _HARMONICS = 4  # by which the true speed is found
 _TRIALS = 20  # a bin of the spectrum
@@ -61,6 +63,8 @@ class Channels:
     angle_error : float
         rad, standard deviation of the angle of the shaft, by which phases are those of a simulation; infinite
         where it is unknown.
+    note : str
+        Signals that are left out, one a line.
     """
 
     names: tuple[str, ...]
@@ -73,6 +77,7 @@ class Channels:
     spin: float
     highest_order: float
     angle_error: float
+    note: str = ""
 
     @property
     def revolutions(self) -> int:
@@ -93,6 +98,14 @@ class Channels:
                 return shares
         return None
 
+    @property
+    def deflection(self) -> float:
+        """Largest amplitude of a displacement, m; 0 where none is measured."""
+        sizes = self.waves.std(axis=1)
+        return math.sqrt(2.0) * max(
+            (size for size, unit in zip(sizes, self.units, strict=True) if unit == "m"), default=0.0
+        )
+
     def of_record(self, signals: Mapping[str, Floats]) -> Floats:
         """Return these signals of a record, (n_channel, n_sample)."""
         return np.stack([np.atleast_2d(signals[name])[0] for name in self.simulated])
@@ -102,12 +115,14 @@ def channels_of(measured: xr.Dataset) -> Channels:
     """Return the channels of a measured dataset.
 
     Signals with the name of a stored one are that; those of a stator are of the first. Of two probes whose
-    orbit is derived the probes themselves are used. Signals that are constant are left out.
+    orbit is derived the probes themselves are used. Signals that are constant are left out, and those that
+    change their size while others do not, as of a broken sensor.
 
     Raises
     ------
     InputError
-        The speed changes, there are several records, too few revolutions, or a probe states no place.
+        The speed or the motion changes, the speed is another than stated, there are several records, too few
+        revolutions, or a probe states no place.
     """
     where = str(measured.attrs.get(MEASURED, "measured"))
     if "spin_speed" not in measured:
@@ -140,13 +155,21 @@ def channels_of(measured: xr.Dataset) -> Channels:
     if revolutions < _FEWEST:
         problem = f"has {revolutions} revolutions, fewer than {_FEWEST}"
         raise InputError(f"{where}: {problem}; give a longer record")
+    waves = np.stack([measured[name].values.astype(float) for name in names])
+    parts = waves[:, : revolutions // _PARTS * _PARTS * n].reshape(len(names), _PARTS, -1).std(axis=2)
+    is_steady = parts.min(axis=1) >= _FADED * parts.max(axis=1)
+    if not is_steady.any():
+        fix = "give a part of the record in which it does not"
+        raise InputError(f"{where}: the size of the motion changes by more than a factor of 3; {fix}")
+    unsteady = [name for name, steady in zip(names, is_steady, strict=True) if not steady]
+    names, simulated = (list(compress(one, is_steady)) for one in (names, simulated))
     spin = float(measured["spin_speed"])
     rate = float(measured.attrs.get("rate", math.inf))
-    waves = np.stack([measured[name].values.astype(float) for name in names])
+    waves = waves[is_steady]
     if measured.attrs.get("has_absolute_phase", 0):
         angle_error = math.hypot(_POINTING, _PLACED * spin / rate)
     else:  # the speed may be a nominal one
-        slip = _slip(waves, n)
+        slip = _slip(waves, n, where)
         spin, waves, angle_error = spin * slip, _turned_by(waves, n, slip), math.inf
     seen = _BAND * min(rate * 2.0 * math.pi / spin, n)
     return Channels(
@@ -154,17 +177,26 @@ def channels_of(measured: xr.Dataset) -> Channels:
         simulated=tuple(simulated),
         units=tuple(str(measured[name].attrs.get("units", "1")) for name in names),
         long_names=tuple(str(measured[name].attrs.get("long_name", name)) for name in names),
-        probes=tuple(probes),
+        probes=tuple(probe for probe in probes if PROBE + probe["name"] in simulated),
         waves=waves,
         n=n,
         spin=spin,
         highest_order=seen,
         angle_error=angle_error,
+        note="\n".join(
+            f"{where}: {name}: changes its size by more than a factor of 3; left out" for name in unsteady
+        ),
     )
 
 
-def _slip(waves: Floats, n: int) -> float:
-    """Return the true speed over the one that was taken, by the place of the lines at 1X to 4X."""
+def _slip(waves: Floats, n: int, where: str) -> float:
+    """Return the true speed over the one that was taken, by the place of the lines at 1X to 4X.
+
+    Raises
+    ------
+    InputError
+        There is no line near 1X.
+    """
     size = np.maximum(waves.std(axis=1, keepdims=True), np.finfo(float).tiny)
     whole = waves / size * np.hanning(waves.shape[1])
     revolutions = waves.shape[1] / n
@@ -180,6 +212,8 @@ def _slip(waves: Floats, n: int) -> float:
 
     bin_width = 1.0 / revolutions
     first = best(1.0, _SLIP, range(1, 2))
+    if abs(first - 1.0) >= (1.0 - 1e-9) * _SLIP:
+        raise InputError(f"{where}: [speed]: no line is within 2 % of it; state the speed of the record")
     near = best(first, 0.5 * bin_width, range(1, _HARMONICS + 1))
     step = bin_width / _TRIALS
     low, middle, high = (power(near + i * step, range(1, _HARMONICS + 1)) for i in (-1, 0, 1))

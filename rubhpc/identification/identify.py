@@ -18,7 +18,7 @@ from rubhpc.identification.evaluation import (
     evaluator,
     take_part,
 )
-from rubhpc.identification.nested import Alone, require_sampler, sample
+from rubhpc.identification.nested import MOST, Alone, require_sampler, sample
 from rubhpc.identification.posterior import Found, tree_of
 from rubhpc.identification.priors import at_shares
 from rubhpc.identification.problem import read_problem
@@ -44,6 +44,9 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 LIVE, DRAWS = 100, 1000
+# Of a hypothesis of which the evidence is asked: it has half the live points.
+FEWEST = 30  # of these: bounds around fewer hold few points that are accepted
+MOST_OF_OTHERS = 40  # evaluations a live point: one that fits badly has no end of small peaks
 POSTERIOR, CASES = "posterior.nc", "cases"
 
 
@@ -164,10 +167,10 @@ def _identify(
         with writing(folder, "--output"):
             (folder / CASES).mkdir(parents=True, exist_ok=True)
 
-    def say(n_call: int, log_evidence: float, left: float) -> None:
-        report(f"{n_call} cases, ln(evidence) {log_evidence:.1f}, {left:.3g} to come")
+    def simulate(rub: Rub, live: int, most: int) -> Sampled:
+        def say(n_call: int, log_evidence: float, left: float) -> None:
+            report(f"{rub.name}: {n_call} cases, ln(evidence) {log_evidence:.1f}, {left:.3g} to come")
 
-    def simulate(rub: Rub) -> Sampled:
         # Kernels are compiled once, and what is wrong with the study is reported, before all processes begin.
         rub.outcome([prior.at(0.5) for prior in rub.priors])
         shared.use(Task(rub=rub, folder=folder and folder / CASES, content=problem.content(rub)))
@@ -178,14 +181,17 @@ def _identify(
             mapper=shared,
             live=live,
             seed=seed,
+            most=most,
             say=say,
         )
 
-    sampled = simulate(problem.rub)
+    sampled = simulate(problem.rub, live, MOST)
     evaluator().evaluated.read()  # those of other ranks
     outcomes = [evaluator().outcome(values) for values in sampled.values]
     others = {
-        other: simulate(other) if isinstance(other, Rub) else _sample_alone(other, live, seed)
+        other: simulate(other, max(live // 2, FEWEST), MOST_OF_OTHERS)
+        if isinstance(other, Rub)
+        else _sample_alone(other, live, seed)
         for other in problem.others
     }
     found = Found(problem=problem, rub=sampled, others=others, outcomes=outcomes)

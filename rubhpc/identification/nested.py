@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 _QUEUE = 8
 _SPARSE = 30.0  # per cent of the points that are accepted, below which they are drawn within bounds
 _PRECISION = 0.1  # of ln(evidence) that is left when the sampling ends
-_MOST = 1000  # evaluations a live point: a rough likelihood, as of a chaotic machine, has no end of peaks
+MOST = 1000  # evaluations a live point: a rough likelihood, as of a chaotic machine, has no end of peaks
 
 
 class Sampled(NamedTuple):
@@ -83,6 +83,7 @@ def sample(
     mapper: Alone | Shared,
     live: int,
     seed: int,
+    most: int = MOST,
     say: Callable[[int, float, float], None] = lambda n_call, log_evidence, left: None,
 ) -> Sampled:
     """Return the points of a distribution.
@@ -99,6 +100,8 @@ def sample(
     live : int
         Live points.
     seed : int
+    most : int
+        Evaluations a live point, after which the sampling is ended.
     say : callable
         Called with the number of evaluations, the logarithm of the evidence, and how much is left of it.
 
@@ -132,7 +135,7 @@ def sample(
             )
         except RuntimeError:
             raise InputError("identify: no case of the prior can be computed; narrow the priors") from None
-        sampler.run_nested(dlogz=_PRECISION, maxcall=_MOST * live, print_progress=True, print_func=report)
+        sampler.run_nested(dlogz=_PRECISION, maxcall=most * live, print_progress=True, print_func=report)
     found = sampler.results
     before = np.concatenate([[0.0], found.logvol[:-1]])
     volumes = np.exp(before) - np.exp(found.logvol)
@@ -145,5 +148,5 @@ def sample(
         log_evidence=float(found.logz[-1]),
         error=float(found.logzerr[-1]) if math.isfinite(found.logzerr[-1]) else 0.0,
         n_call=(n_call := int(np.sum(found.ncall))),
-        is_whole=n_call <= _MOST * live,
+        is_whole=n_call <= most * live,
     )

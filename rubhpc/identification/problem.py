@@ -14,7 +14,7 @@ from postproc.measured.measured import measured
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.modes import modes
-from rubhpc.identification.candidates import Machine, Rub, hypotheses_of
+from rubhpc.identification.candidates import Machine, Misalignment, NoRub, Rub
 from rubhpc.identification.channels import channels_of
 from rubhpc.identification.comparison import Comparison, period_of_lines
 from rubhpc.identification.lines import LineComparison
@@ -26,7 +26,7 @@ from rubhpc.input.reading import read_toml
 from rubhpc.rig.reading import read_rig
 from rubhpc.study.axes import SPEED_AXES
 from rubhpc.study.axis_reading import flatten
-from rubhpc.study.identity import physics_of
+from rubhpc.study.identity import PHYSICS
 from rubhpc.study.study import line_of_text, overridden, study_of, table_of
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ class Problem:
         study = rub.machine.study
         names = [prior.name for prior in rub.priors]
         table = {
-            "physics": physics_of(study),
+            "physics": PHYSICS,
             "study": {**study.as_dict(), "title": "", "rig": study.rig.as_dict()},
             "open": names,
             "spin": self.channels.spin,
@@ -183,13 +183,21 @@ def read_problem(
         channels=channels,
         priors=known.priors,
     )
-    rub, others = hypotheses_of(machine, comparison)
+    slacks = tuple(slack_bearings(machine, comparison)) if slack else ()
+    if slack and not slacks:
+        raise InputError(
+            f"{known.name}: slack: no bearing of the rig has springs to the ground; leave it out"
+        )
     return Problem(
         machine=machine,
         comparison=comparison,
-        rub=rub,
-        others=(*others, *(slack_bearings(machine, comparison) if slack else ())),
-        note=str(data.attrs.get("note", "")),
+        rub=Rub(machine=machine, comparison=comparison),
+        others=(
+            NoRub(machine=machine, comparison=comparison),
+            Misalignment(machine=machine, comparison=comparison),
+            *slacks,
+        ),
+        note="\n".join(filter(None, [data.attrs.get("note", ""), channels.note])),
     )
 
 

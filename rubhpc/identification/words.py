@@ -29,6 +29,8 @@ _TIED = 0.9  # rank correlation of two quantities that are known together only
 _BAD = 4.0  # mean square of residuals over their standard deviation that no model should have
 _INTERVAL = (0.025, 0.5, 0.975)
 _NONE = "no rub"  # name of the hypothesis
+_FAULTS = {_NONE: "no other fault", "misalignment": "misalignment"}  # else a slack bearing
+_DRAWS = 1000  # of a hypothesis that is not the rub
 _BEFORE = ", if both were equally likely before"
 
 
@@ -46,11 +48,11 @@ def in_words(found: Found, tree: xr.DataTree) -> Iterator[str]:
     yield "ln(evidence): " + ", ".join(
         f"{name} {value:.1f} +- {error:.1f}" for name, (value, error) in evidence.items()
     )
-    for one, sampled in ((problem.rub, found.rub), *found.others.items()):
-        if not sampled.is_whole:
-            fix = "it may explain more than was found; narrow the priors"
-            yield f"{one.name}: the sampling was ended after {sampled.n_call} cases; {fix}"
     best = max(evidence, key=lambda name: evidence[name][0])
+    for one, sampled in ((problem.rub, found.rub), *found.others.items()):
+        if not sampled.is_whole and sampled.log_likelihoods.max() > evidence[best][0] - _SURE:
+            fix = "it may explain more than was found; narrow the priors or raise --live"
+            yield f"{one.name}: the sampling was ended after {sampled.n_call} cases; {fix}"
     if problem.rub.name not in evidence:
         yield "no case of [grid] touches, so that a rub has not been tried; lower the clearance"
     yield from _verdict(evidence, problem.rub.name)
@@ -65,6 +67,9 @@ def in_words(found: Found, tree: xr.DataTree) -> Iterator[str]:
         if 0.0 < before < 1.0:
             share = f"{after:.2g}" if after > _NEVER else "almost none"
             yield f"of the cases of [grid] a share of {before:.2g} touches, of those that fit {share}"
+        one, sampled = next(item for item in found.others.items() if item[0].name == best)
+        values = sampled.values[sampled.draws(_DRAWS, 1)]
+        yield from itertools.starmap(_known, zip(one.priors, values.T, strict=True))
         return
     yield from _contacts(found, tree)
     yield from _values(found, tree)
@@ -82,12 +87,14 @@ def _verdict(evidence: dict[str, tuple[float, float]], rub: str) -> Iterator[str
             yield f"it is {sure}a rub: {odds} against {others[0]}{_BEFORE}"
             return
         yield f"it is {sure}not a rub: {odds} against one{_BEFORE}"
-    _, odds, sure = _odds(evidence, others[0], others[1])
-    if odds:
-        what = "no other fault" if others[0] == _NONE else others[0]
-        yield f"it is {sure}{what}: {odds} against {others[1]}"
-    else:
-        yield f"the data do not distinguish {others[0]} from {others[1]}"
+    first, *rest = others
+    tied = [name for name in rest if not _odds(evidence, first, name)[1]]
+    if tied:
+        yield f"the data do not distinguish {first} from {' and '.join(tied)}"
+    for other in rest[len(tied) : len(tied) + 1]:
+        _, odds, sure = _odds(evidence, first, other)
+        what = "one of these" if tied else _FAULTS.get(first, f"a {first}")
+        yield f"it is {sure}{what}: {odds} against {other}"
 
 
 def _odds(evidence: dict[str, tuple[float, float]], one: str, other: str) -> tuple[float, str, str]:
@@ -135,7 +142,7 @@ def _values(found: Found, tree: xr.DataTree) -> Iterator[str]:
     priors = found.problem.rub.priors
     draws = {prior.name: posterior[prior.axis.coordinate].values for prior in priors}
     for prior in priors:
-        yield f"{prior.name} = {_interval(draws[prior.name], prior.axis.unit)}; {_before(prior)} before"
+        yield _known(prior, draws[prior.name])
     discrepancy = float(np.median(posterior["discrepancy"].values))
     yield f"relative error of the model's lines, as the data show it: {100 * discrepancy:.2g} %"
     unknown = [prior.name for prior in priors if np.std(draws[prior.name]) > _OPEN * prior.spread]
@@ -151,6 +158,6 @@ def _values(found: Found, tree: xr.DataTree) -> Iterator[str]:
             yield f"the data cannot distinguish {first} from {second} (rank correlation {tied:.2f})"
 
 
-def _before(prior: Prior) -> str:
-    low, high = prior.at(0.025), prior.at(0.975)
-    return f"{_short(low, prior.axis.unit)} to {_short(high, prior.axis.unit)}"
+def _known(prior: Prior, draws: Floats) -> str:
+    low, high = (_short(prior.at(share), prior.axis.unit) for share in (0.025, 0.975))
+    return f"{prior.name} = {_interval(draws, prior.axis.unit)}; {low} to {high} before"

@@ -6,24 +6,24 @@ import math
 import time
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from rubhpc.integrate.carried_tangent import CarriedTangent
-from rubhpc.integrate.compilation import COLLOCATION, COMMON, PERIODIC, RUN_UPS, seconds_compiling
+from rubhpc.integrate.compilation import COLLOCATION, COMMON, PERIODIC, seconds_compiling
 from rubhpc.integrate.lyapunov import Growth, Marches
 from rubhpc.integrate.marched_record import march_record
 from rubhpc.integrate.marches.central_difference import CentralDifferenceMarch
 from rubhpc.integrate.marches.collocation import CollocationMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
+from rubhpc.integrate.marches.march import ended_in
 from rubhpc.integrate.marches.met_modes import NoClosedForm
-from rubhpc.integrate.marches.modal import ModalMarch
 from rubhpc.integrate.measuring.divergence import diverged_record
 from rubhpc.integrate.measuring.measures import measures_of
 from rubhpc.integrate.measuring.monitors import carrier_displacement, monitored
 from rubhpc.integrate.measuring.orbit_measures import period
-from rubhpc.integrate.measuring.regimes import LASTING, by_growth, regime
+from rubhpc.integrate.measuring.regimes import LASTING, by_growth, regime, undecided
 from rubhpc.integrate.measuring.rub_in_bores import rub_measures
 from rubhpc.integrate.measuring.samples import (
     add_sag,
@@ -55,6 +55,7 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.model import Model
     from rubhpc.integrate.marches.march import March
+    from rubhpc.integrate.marches.modal import ModalMarch
     from rubhpc.integrate.measuring.measures import Judge
     from rubhpc.integrate.measuring.regimes import Verdict
     from rubhpc.integrate.periodic_motions.collocated_motion import FollowedMotion
@@ -79,6 +80,8 @@ class Case:
     ----------
     look : callable
         Called with a march between its kernel calls, if any.
+    is_judged : bool
+        Whether its regime is found; else it is undecided.
     """
 
     setup: Setup
@@ -87,6 +90,7 @@ class Case:
     friction: float
     recording: Recording
     look: Callable[[March], None] | None = None
+    is_judged: bool = True
 
     def march(self, state: State, setup: Setup | None = None) -> March:
         """Start a march from a state, of this set-up or of another one."""
@@ -105,6 +109,11 @@ class Case:
         make = followed_motion(self.scheme, **options)
         return make(self.setup, self.clearance, self.friction, initial, march)
 
+    @property
+    def has_tangent(self) -> bool:
+        """Whether its motions can be followed with small changes of them."""
+        return self.scheme is not Scheme.CENTRAL_DIFFERENCE
+
 
 def run_case(
     setup: Setup,
@@ -116,6 +125,7 @@ def run_case(
     check: Callable[[], None] | None = None,
     say: Callable[[str], None] = lambda _: None,
     note: Callable[[float], None] = lambda _: None,
+    is_judged: bool = True,
 ) -> Record:
     """Integrate one case and measure it.
 
@@ -134,6 +144,8 @@ def run_case(
         Called with the progress of the case as often as `check`, if that is given.
     note : callable
         Called before each `check` with the share of transient and record that is done; 1 after the record.
+    is_judged : bool
+        Whether the regime is found, which may take longer than the record; else it is undecided.
     """
     n_whole = recording.longest_transient + recording.revolutions
     began = time.perf_counter() - seconds_compiling()
@@ -156,6 +168,7 @@ def run_case(
         friction=friction,
         recording=recording,
         look=None if check is None else look,
+        is_judged=is_judged,
     )
     try:
         record = _integrate(case, state)
@@ -181,12 +194,11 @@ def reached(revolution: float) -> str:
     return f"a case at revolution {revolution:.0f} of its record"
 
 
-def kernel_sets(setup: Setup, *, changes_speed: bool = False) -> set[str]:
+def kernel_sets(setup: Setup) -> set[str]:
     """Return the sets of kernels that a case of this set-up may need (`compilation`)."""
     if not isinstance(setup, ModalSetup):
         return {COMMON}
-    sets = {COMMON, RUN_UPS} if changes_speed else {COMMON}
-    return sets | {COLLOCATION if setup.scheme is Scheme.COLLOCATION else PERIODIC}
+    return {COMMON, COLLOCATION if setup.scheme is Scheme.COLLOCATION else PERIODIC}
 
 
 def compile_kernels(
@@ -218,7 +230,8 @@ def _integrate(case: Case, initial: State) -> Record:
     n_step = 0
     per_revolution = setup.samples_per_revolution
     settings = {"spin_speed": setup.spin, "clearance": case.clearance}
-    if recording.is_transient_direct and isinstance(march, ModalMarch):
+    if recording.is_transient_direct and case.has_tangent:
+        march = cast("ModalMarch", march)
         motions = solved_motions(march.setup, (case.clearance, case.friction, recording))
         march, reason, n_transient, n_step, motion = pass_directly(
             march, partial(case.motion, None), recording, motions
@@ -254,7 +267,7 @@ def _integrate(case: Case, initial: State) -> Record:
         n_kept = samples_within(samples, n_before + march.sample, setup.displacement_limit)
         revolution = n_transient + min(n_kept // per_revolution + 1, recording.revolutions)
         record = diverged_record(
-            f"{reason} in revolution {revolution}",
+            ended_in(reason, revolution),
             len(setup.model.stators),
             recording,
             settings,
@@ -293,7 +306,7 @@ def _integrate(case: Case, initial: State) -> Record:
             n_exponent=recording.lyapunov,
         )
         if recording.lyapunov:
-            record.measures.update(exponents_of(last, march, final))
+            record.measures.update(exponents_of(last, final))
         if "waveform" not in recording.keep:
             record.signals.clear()
     if motion is not None:
@@ -314,10 +327,10 @@ def _spectra(samples: Samples, model: Model) -> dict[str, Floats]:
     return {f"spectrum_{name}": spectrum for name, spectrum in spectra.items() if name not in unasked}
 
 
-def exponents_of(case: Case, march: March, final: State) -> dict[str, float]:
-    """Lyapunov exponents from where a march has ended; NaN where it has no tangent."""
+def exponents_of(case: Case, final: State) -> dict[str, float]:
+    """Lyapunov exponents from where a case has ended; NaN where it has no tangent."""
     n_exponent = case.recording.lyapunov
-    if not isinstance(march, ModalMarch):
+    if not case.has_tangent:
         return dict.fromkeys(lyapunov_variables(n_exponent), math.nan)
     found = spectrum_of(partial(case.motion, final), n_exponent)
     largest = found["lyapunov_1"]
@@ -329,13 +342,15 @@ def judge_of(case: Case, march: March, final: State, n_event: float) -> Judge:
 
     A march of the case that is needed no more is started again; `n_event` are the events in a revolution.
     """
-    solver = Solver(case.motion, final, march) if isinstance(march, ModalMarch) else None
+    if not case.is_judged:
+        return undecided
+    solver = Solver(case.motion, final, cast("ModalMarch", march)) if case.has_tangent else None
 
     def growth_from(state: State) -> Growth:
-        if isinstance(march, ModalMarch):
-            accuracy = march.setup.accuracy
-            return Growth(lambda: CarriedTangent(case.motion(state, march, accuracy=accuracy)))
-        return Growth(lambda: Marches(case.march, state, case.setup, case.recording))
+        if not case.has_tangent:
+            return Growth(lambda: Marches(case.march, state, case.setup, case.recording))
+        accuracy = cast("ModalSetup", case.setup).accuracy
+        return Growth(lambda: CarriedTangent(case.motion(state, march, accuracy=accuracy)))
 
     def lasts(exponent: float) -> bool:
         """Whether chaos was followed to the end of what is followed, does not drift and is chaos there."""

@@ -19,14 +19,12 @@ if TYPE_CHECKING:
 COMMON = ""
 COLLOCATION = "for curved gaps and any law"
 PERIODIC = "for periodic motions"
-RUN_UPS = "for run-ups"
 # Sets of kernels, each announced, and compiled when a case first needs it -> seconds that it takes, about.
-_SECONDS = {COMMON: 10, COLLOCATION: 15, PERIODIC: 10, RUN_UPS: 10}
+_SECONDS = {COMMON: 10, COLLOCATION: 15, PERIODIC: 10}
 _SETS = {  # kernel -> its set; all others are common
     "advance_by_collocation": COLLOCATION,
     "follow_revolutions": PERIODIC,
     "carry_pieces": PERIODIC,
-    "advance_pieces": RUN_UPS,
 }
 _announced: list[str] = []
 _expected: set[str] = set()  # sets of the study that is run

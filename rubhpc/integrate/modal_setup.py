@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import weakref
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
@@ -12,6 +13,7 @@ import numpy as np
 from rubhpc.integrate.measuring.divergence import energy_limit
 from rubhpc.integrate.reduced_model.contact_mode import ContactMode, solve_contact_mode
 from rubhpc.integrate.reduced_model.flight_modes import FlightModes
+from rubhpc.integrate.reduced_model.flight_modes import FlightModes, motion_rows
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
 from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions, kernel_bodies
 from rubhpc.integrate.reduced_model.touching import OpenBodies, open_bodies
@@ -78,6 +80,16 @@ class ModalSetup:
     release: Release | None = None
     is_measured: bool = True  # False: tables have no outputs and energies
     _libraries: dict[float, ModeLibrary] = field(default_factory=dict)
+
+    @property
+    def has_energies(self) -> bool:
+        """Whether records have the losses by damping and the works of turning forces."""
+        return self.is_measured
+
+    @cached_property
+    def local_motions(self) -> Floats:
+        """Local motions of each pair (`flight_modes.motion_rows`)."""
+        return motion_rows(self.reduced, self.model, self.accuracy)
 
     @cached_property
     def energy_limit(self) -> float:
@@ -176,8 +188,10 @@ class ModalSetup:
             orders.append(order)
             forced.append(np.concatenate([moved, rate * moved]))
         is_complex, turning = exponent.imag != 0.0, 1j * self.spin
+        # A reference back would keep both, megabytes of tables, until a rare collection of cycles.
+        own = weakref.proxy(self)
         return FlightModes(
-            self, exponent, motion, enter, is_complex, turning, np.array(orders), np.column_stack(forced)
+            own, exponent, motion, enter, is_complex, turning, np.array(orders), np.column_stack(forced)
         )
 
     @cached_property

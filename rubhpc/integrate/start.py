@@ -54,14 +54,24 @@ def fit_to_gaps(state: State, setup: Setup, clearance: float) -> State:
     Raises
     ------
     InputError
-        The state is of a rig with other degrees of freedom, or the stators leave no room for the shaft.
+        The state is of a rig with other degrees of freedom, the stators leave no room for the shaft, or no
+        start without overlap is found near the state.
     """
     if state.packed().size != state_size(setup.model):
         raise InputError(
             f"initial: a state of {state.packed().size} numbers for a rig of {state_size(setup.model)}; "
             "use it only for cases with the same degrees of freedom"
         )
-    return _fitted(state, setup, clearance)[0]
+    fitted, is_found = _fitted(state, setup, clearance)
+    if not is_found:
+        left, begun = (gaps(one.displacement, setup, clearance)[0] for one in (fitted, state))
+        allowed = 0.0 if state.overlap is None else state.overlap
+        if np.any(left + allowed < -PARTED):
+            raise InputError(
+                f"initial: this state overlaps by {-begun.min():.2g} m, and no start within the clearances "
+                "is found near it; start nearer to them, or from rest"
+            )
+    return fitted
 
 
 def _fitted(state: State, setup: Setup, clearance: float, *, is_soft: bool = False) -> tuple[State, bool]:

@@ -85,12 +85,6 @@ def linked_sum(function: F) -> F:
     return compiled
 
 
-def inlined(function: F) -> F:
-    """Compile what makes a struct into its callers: the struct lasts as long as the function that made it."""
-    compiled: F = numba.njit(**_FLAGS, inline="always")(function)
-    return compiled
-
-
 def plain(kernel: F) -> F:
     """Return the Python function of a kernel, for rare calls that are not worth a compilation.
 

@@ -38,6 +38,7 @@ class Seat:
     """Position of a stator, or of a ring of `count` stators, the first one at `angle`."""
 
     KIND: ClassVar[str] = ""
+    REFUSED: ClassVar[tuple[str, ...]] = ()  # keys of a seat that this kind has not
 
     kind: str | None = choice(
         doc="What the stator is; by default what its other keys say. A bore needs it.",
@@ -324,6 +325,7 @@ class Bore(Seat):
     """
 
     KIND = "bore"
+    REFUSED = ("angle", "count")
 
     mass: float | None = quantity(
         "kg", doc="Mass of the hole's body.", example='"2 kg"', default=None, above=0
@@ -369,9 +371,9 @@ class Bore(Seat):
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "kind", self.KIND)
-        if self.angle or self.count is not None:
-            key = "angle" if self.angle else "count"
-            raise FieldError(key, "a bore surrounds the rotor and has none; remove it")
+        for key in self.REFUSED:
+            if getattr(self, key):
+                raise FieldError(key, "a bore surrounds the rotor and has none; remove it")
         if len(self.centre) != 2:
             raise FieldError("centre", 'not two numbers; write ["20 um", "-35 um"], up and across')
         both = {one: (f"{one}_y", f"{one}_z") for one in ("stiffness", "damping")}

@@ -30,8 +30,7 @@ def warm_up(grid: CaseGrid, index: Sequence[int], check: Callable[[], None]) -> 
     """Do so for each law of contact of the study, elsewhere as at an index; see `load_kernels`."""
     cases = grid.with_each_law(index)
     setups = [set_up_for_kernels(grid.study, case) for case in cases]
-    changes = cases[0].speed_law is not None
-    expect_sets(set().union(*(kernel_sets(setup, changes_speed=changes) for setup in setups)))
+    expect_sets(set().union(*(kernel_sets(setup) for setup in setups)))
     for case in cases:
         load_kernels(grid, case, check)
 

@@ -57,8 +57,6 @@ def differences(stored: Manifest, asked: Manifest) -> list[str]:
             if leaf[1] != leaf[2] and not (has_other_axes and leaf[0].startswith("axes."))
         ]
     )
-    if len(found) > 1:  # the version of the physics depends on the study
-        found = [text for text in found if not text.startswith("physics ")]
     if has_other_axes:
         return [f"axes were {', '.join(stored.dims)}, are {', '.join(asked.dims)}", *found]
     for dim in stored.dims:

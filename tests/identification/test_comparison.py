@@ -142,16 +142,24 @@ def test_a_quasi_periodic_motion_repeats_in_no_number_of_revolutions():
     assert period_of_lines(replace(long, waves=np.stack([whirl.real, whirl.imag]))) == 26
 
 
+def drifting(seed, size=0.3):
+    """A motion whose phases walk at random."""
+    drift = np.cumsum(size * np.random.default_rng(seed).standard_normal((2, ANGLE.size)), axis=1)
+    return np.stack([np.cos(ANGLE + drift[0]), np.sin(ANGLE + drift[1])])
+
+
 def test_powers_of_a_chaotic_motion_need_no_phase():
-    rng = np.random.default_rng(5)
-    drift = np.cumsum(0.3 * rng.standard_normal((2, ANGLE.size)), axis=1)
-    measured = np.stack([np.cos(ANGLE + drift[0]), np.sin(ANGLE + drift[1])])
-    again = np.cumsum(0.3 * np.random.default_rng(6).standard_normal((2, ANGLE.size)), axis=1)
-    same, other = ((np.stack([np.cos(ANGLE + d[0]), np.sin(ANGLE + d[1])])) for d in (again, 0.3 * again))
-    powers = PowerComparison(channels(measured), [])
+    powers = PowerComparison(channels(drifting(5)), [])
+    same, other = (powers.of(drifting(6, size)) for size in (0.3, 0.09))
     assert "no phases" in powers.about
-    assert log_likelihood(powers, powers.of(same)) > log_likelihood(powers, powers.of(other)) + 5
-    assert powers.misfit(powers.of(same)) < 3
+    assert log_likelihood(powers, same) > log_likelihood(powers, other) + 5
+    assert powers.misfit(same) < 3
+
+
+def test_the_likelihood_of_a_chaotic_motion_varies_by_chance_by_one():
+    powers = PowerComparison(channels(drifting(5)), [])
+    logs = [log_likelihood(powers, powers.of(drifting(seed))) for seed in range(100, 160)]
+    assert 0.5 < np.std(logs) < 1.3
 
 
 def test_two_probes_at_one_place_see_the_orbit():

@@ -14,6 +14,7 @@ from rubhpc.commands.identify import identify
 from rubhpc.errors import InputError
 from rubhpc.identification import evaluation
 from rubhpc.identification.problem import read_problem
+from rubhpc.identification.words import _verdict
 
 SMALL = {"live": 16, "draws": 200}
 
@@ -102,6 +103,15 @@ def test_what_is_not_a_rub_is_said(tmp_path, kind):
         assert max(evidence["no rub"], evidence["misalignment"]) > evidence["rub"] + 10
 
 
+@pytest.mark.parametrize("node", [1, 4, 15])
+def test_misalignment_is_found_wherever_it_acts(tmp_path, node):
+    problem = read_problem(*rubbing_machine.write(tmp_path, rubbing_machine.linear(True, 40, 0.05, node)))
+    healthy, misaligned = problem.others
+    assert misaligned.log_likelihood([]) > healthy.log_likelihood([]) + 50
+    seen, unknown = problem.comparison.of(misaligned.waves([])), misaligned.unknown([])
+    assert problem.comparison.misfit(seen, unknown) < 1.5
+
+
 def test_a_clearance_that_may_be_wide_does_not_hide_a_healthy_machine(tmp_path):
     columns = rubbing_machine.linear(False, 40, 0.05)
     study = rubbing_machine.STUDY.replace('stop = "150 um"', 'stop = "400 um"')
@@ -114,15 +124,113 @@ def test_a_clearance_that_may_be_wide_does_not_hide_a_healthy_machine(tmp_path):
     assert "it is probably no other fault" in text
 
 
+SLACK_RIG = """
+name = "slack"
+[rotor]
+gravity = "9.81 m/s^2"
+clearance_from = "standstill"
+[[rotor.shaft]]
+length = "0.4 m"
+outer_diameter = "20 mm"
+elements = 4
+youngs_modulus = "206 GPa"
+poissons_ratio = 0.3
+density = 7850.0
+[[rotor.disc]]
+node = 3
+diameter = "0.16 m"
+thickness = "20 mm"
+density = 7850.0
+[[rotor.bearing]]
+position = 0.0
+stiffness = 4e6
+damping = "150 N s/m"
+mass = "0.2 kg"
+[[rotor.bearing]]
+node = 5
+stiffness = 4e6
+damping = "150 N s/m"
+[[rotor.unbalance]]
+node = 3
+mass = "3 g"
+radius = "8 cm"
+[rotor.torsion]
+fixed_node = 1
+[rotor.damping]
+alpha = 15.0
+[[carrier]]
+name = "casing"
+mass = "20 kg"
+stiffness = "1e8 N/m"
+[[stator]]
+carrier = "casing"
+kind = "bore"
+node = 3
+mass = "5 kg"
+stiffness = "1e7 N/m"
+"""
+
+
+SLACK_STUDY = """
+rig = "rig.toml"
+[grid]
+clearance = { start = "10 um", stop = "90 um" }
+friction = 0.2
+"rotor.unbalance.mass" = "2 g"
+"rotor.bearing.stiffness" = [1e6, 4e6, 9e6]
+"""
+
+
 def test_slack_bearings_take_the_place_of_springs(tmp_path):
-    files = rubbing_machine.write(tmp_path, rubbing_machine.linear(False, 40, 0.05))
+    files = rubbing_machine.write(tmp_path, rubbing_machine.linear(False, 40, 0.05), SLACK_STUDY)
+    (tmp_path / "rig.toml").write_text(SLACK_RIG)
     problem = read_problem(*files, slack=True)
-    assert [other.name for other in problem.others[2:]] == [f"slack bearing at node {n}" for n in (1, 15)]
-    rig = problem.others[2].machine.study.rig
-    assert [bearing.stiffness_matrix[0][0] for bearing in rig.rotor.bearing] == pytest.approx([1e3, 1e6])
-    (wall,) = rig.stator
-    assert (wall.node, wall.law.stiffness) == (1, pytest.approx(1e6))
-    assert [prior.name for prior in problem.others[2].priors] == ["clearance"]  # none of the rotor is open
+    others = problem.others[2:]
+    assert [other.name for other in others] == [f"slack bearing at node {n}" for n in (1, 5)]
+    rig = others[0].machine.study.rig
+    assert [bearing.stiffness_matrix[0][0] for bearing in rig.rotor.bearing] == pytest.approx([4e3, 4e6])
+    assert rig.rotor.bearing[0].mass == 0.2
+    assert rig.rotor.unbalance[0].mass == pytest.approx(2e-3)  # known by the study
+    _, wall = rig.stator
+    assert (wall.node, wall.law.stiffness) == (1, pytest.approx(4e6))
+    assert rig.rotor.clearance_from == "unloaded"  # not a loose shaft's sag of millimetres
+    # The springs of bearings are no open keys: they would make the slack one stiff again.
+    assert [prior.name for prior in others[0].priors] == ["clearance", "stator.2.law.stiffness"]
+    outcome = others[0].outcome([prior.at(0.5) for prior in others[0].priors])
+    assert outcome.contact_fraction[0] == 0.0
+    assert outcome.contact_fraction[1] > 0.1
+
+
+def test_a_slack_bearing_explains_its_record(tmp_path):
+    columns = rubbing_machine.linear(False, 40, 0.05)
+    del columns["torsion"]
+    files = rubbing_machine.write(tmp_path, columns, SLACK_STUDY)
+    (tmp_path / "rig.toml").write_text(SLACK_RIG)
+    true, values = read_problem(*files, slack=True).others[3], [40e-6, 5e6]
+    signals = true.machine.simulate(values).to_dataset()
+    sensors = {
+        name: rubhpc.Sensor(white=0.02 * float(signals[name].std())) for name in columns.keys() & signals
+    }
+    rate = 200.37 * float(signals["spin_speed"]) / (2 * np.pi)
+    seen = rubhpc.sense(signals, sensors, rate=rate, seed=3)
+    rubbing_machine.write(tmp_path, {name: seen[name].values for name in columns}, SLACK_STUDY)
+    problem = read_problem(*files, slack=True)
+    healthy, misaligned, other, same = problem.others
+    outcome = same.outcome(values)
+    assert problem.comparison.misfit(outcome.seen) < 1.5
+    springs = [prior.at(0.5) for prior in healthy.priors]  # of the bearings
+    logs = [one.log_likelihood(springs) for one in (healthy, misaligned)]
+    most = max(*logs, other.log_likelihood(other.outcome(values)))
+    assert same.log_likelihood(outcome) > most + 50
+
+
+def test_a_rig_without_springs_has_no_slack_bearings(tmp_path):
+    study = SLACK_STUDY.replace('"rotor.bearing', '# "rotor.bearing')
+    files = rubbing_machine.write(tmp_path, rubbing_machine.linear(False, 40, 0.05), study)
+    table = "speed = [10.0, 900.0]\nkyy = [4e6, 4e6]\nkzz = [4e6, 4e6]\n"
+    (tmp_path / "rig.toml").write_text(SLACK_RIG.replace("stiffness = 4e6\n", table))
+    with pytest.raises(InputError, match="slack: no bearing of the rig has springs to the ground"):
+        read_problem(*files, slack=True)
 
 
 def test_a_speed_that_is_known_roughly_is_refined(tmp_path):
@@ -134,6 +242,40 @@ def test_a_speed_that_is_known_roughly_is_refined(tmp_path):
     assert problem.channels.spin == pytest.approx(rubbing_machine.SPIN, rel=2e-5)  # a thousandth of a bin
     assert "repeats" in problem.comparison.about
     assert problem.channels.angle_error == np.inf
+
+
+def test_ties_among_other_faults_are_said():
+    one, other = "slack bearing at node 1", "slack bearing at node 5"
+    evidence = {"rub": (0.0, 0.1), "no rub": (-50.0, 0.1), one: (30.0, 0.5), other: (30.4, 0.5)}
+    assert list(_verdict(evidence, "rub"))[1:] == [
+        f"the data do not distinguish {other} from {one}",
+        "it is one of these: odds of more than a million to 1 against no rub",
+    ]
+    assert list(_verdict(evidence | {one: (0.0, 0.5)}, "rub"))[1:] == [
+        f"it is a {other}: odds of more than a million to 1 against {one}"
+    ]
+
+
+def test_another_speed_than_that_of_the_record_is_refused(tmp_path):
+    columns = rubbing_machine.linear(True, 40, 0.05)
+    del columns["key_phasor"]
+    measured, study = rubbing_machine.write(tmp_path, columns)
+    measured.write_text(measured.read_text().replace(f"{rubbing_machine.SPIN} rad/s", "330 rad/s"))
+    with pytest.raises(InputError, match=r"probe.csv: \[speed\]: no line is within 2 % of it"):
+        read_problem(measured, study)
+
+
+def test_broken_sensors_are_left_out(tmp_path):
+    columns = rubbing_machine.linear(True, 40, 0.05)
+    columns["torsion"][:] = -0.3
+    columns["horizontal"][columns["time"].size // 3 :] = 0.0
+    problem = read_problem(*rubbing_machine.write(tmp_path, columns))
+    assert problem.channels.names == ("vertical",)
+    assert "column torsion: is -0.3 throughout; check the sensor" in problem.note
+    assert "horizontal: changes its size by more than a factor of 3; left out" in problem.note
+    columns["vertical"][columns["time"].size // 3 :] *= 0.1
+    with pytest.raises(InputError, match="the size of the motion changes by more than a factor of 3"):
+        read_problem(*rubbing_machine.write(tmp_path, columns))
 
 
 @pytest.mark.parametrize(

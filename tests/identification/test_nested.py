@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from rubhpc.errors import InputError
-from rubhpc.identification import nested
-from rubhpc.identification.nested import Alone, sample
+from rubhpc.identification.nested import MOST, Alone, sample
 
 MEAN, STD = np.array([0.4, 0.6]), np.array([0.02, 0.05])
 
@@ -25,8 +24,8 @@ class TwoAtATime(Alone):
         return [half[i % 2][i // 2] for i in range(len(listed))]
 
 
-def found(mapper, likelihood=gaussian):
-    return sample(likelihood, lambda shares: shares, 2, mapper=mapper, live=100, seed=3)
+def found(mapper, likelihood=gaussian, most=MOST):
+    return sample(likelihood, lambda shares: shares, 2, mapper=mapper, live=100, seed=3, most=most)
 
 
 def test_evidence_and_posterior_of_a_gaussian():
@@ -42,9 +41,8 @@ def test_evidence_and_posterior_of_a_gaussian():
     assert volume == pytest.approx(0.5, abs=0.1)  # the points weighted by their volumes are the prior
 
 
-def test_a_likelihood_without_end_is_left(monkeypatch):
-    monkeypatch.setattr(nested, "_MOST", 6)
-    one = found(Alone(), lambda values: 1e3 * math.sin(1e6 * values.sum()))
+def test_a_likelihood_without_end_is_left():
+    one = found(Alone(), lambda values: 1e3 * math.sin(1e6 * values.sum()), most=6)
     assert 600 < one.n_call < 2000
     assert not one.is_whole
     assert np.exp(one.log_weights).sum() == pytest.approx(1)

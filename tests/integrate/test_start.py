@@ -140,3 +140,16 @@ def test_a_start_far_beyond_two_bores_touches_both():
     )
     assert record.contact_force[:, 0].min() > 100.0
     assert abs(record.energy_residual) < 1e-6
+
+
+def test_a_start_that_no_clearance_admits_is_refused():
+    """Two holes at one node, further apart than both are wide."""
+    rig = read_rig("mokhtar2017")
+    apart = tuple(Bore(node=8, rigid=True, centre=(height, 0.0)) for height in (3e-5, -3e-5))
+    given = {"speed_ratio": 0.99, "friction": 0.1, "transient": 0, "revolutions": 1}
+    rig = replace(rig, stator=apart)
+    wide = simulate_any(rig, **given, clearance="20 mm").final
+    with pytest.raises(
+        InputError, match=r"^initial: this state overlaps by .* m, and no start .*; start nearer"
+    ):
+        simulate_any(rig, **given, clearance="5 um", initial=wide)

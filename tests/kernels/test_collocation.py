@@ -373,3 +373,17 @@ def test_first_roots_are_those_of_numpy(s):
         n_found += inside.size > 0
         assert first(nodes, known(nodes.at), 0.0) == pytest.approx(expected, abs=1e-10)
     assert n_found > 10
+
+
+@pytest.mark.parametrize(("speed", "jerk"), [(2e-3, 0.0), (3e-3, 4e5), (1e-4, -2e5)])
+def test_gap_that_opens_comes_back_where_its_cubic_does(speed, jerk):
+    """Of v t - a t^2 / 2 + j t^3 / 6, whose acceleration fades or grows."""
+    span, acceleration = 1.0, 1.0e-2
+    jerk *= 1e-8
+    roots = np.roots([jerk / 6, -acceleration / 2, speed]).real if jerk else [2 * speed / acceleration]
+    expected = min(root for root in roots if root > 0.0)
+    assert expected < span
+    mean = speed - acceleration / 2 + jerk / 6
+    comes = speed - acceleration + jerk / 2
+    assert interpreted(events.return_place)(speed, comes, mean) == pytest.approx(expected, rel=1e-12)
+    assert interpreted(events.return_place)(-speed, comes, mean) == 0.0

@@ -276,7 +276,7 @@ def test_another_version_of_the_physics_is_refused_unless_it_is_accepted(tmp_pat
     store = open_store(grid_for(study))
     compute(store, all_of_it=True)
     before = known(store)
-    old = identity.physics_of(study)
+    old = identity.PHYSICS
     monkeypatch.setattr(identity, "PHYSICS", identity.PHYSICS + 1)
     reported = f"physics was {old}, is {old + 1}"
     with pytest.raises(StoreError, match=f"{reported}; --accept-version keeps its cases"):

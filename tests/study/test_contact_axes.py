@@ -1,7 +1,5 @@
 """Keys of [contact] as axes of a grid: which combinations can be, what each case takes, ids, the store."""
 
-from dataclasses import replace
-
 import pytest
 import xarray as xr
 from closed_form import LAWS, Contact
@@ -15,10 +13,8 @@ from rubhpc.running.driver import run
 from rubhpc.running.recompute import reproduce
 from rubhpc.storage.store import Store
 from rubhpc.storage.verify import verify
-from rubhpc.study import identity
 from rubhpc.study.axes import Axis
 from rubhpc.study.axis_reading import make_axis
-from rubhpc.study.branch_keys import BranchKeys
 from rubhpc.study.cases import CaseGrid
 from rubhpc.study.study import read_study
 
@@ -60,58 +56,6 @@ def test_each_case_takes_its_own_contact(tmp_path):
         Contact(restitution=0.5),
         Contact(restitution=0.5, static_friction_ratio=1.2, **coulomb),
     }
-
-
-@pytest.mark.parametrize(
-    ("axes", "contact", "further"),
-    [
-        ("", 'law = "penalty"\nstiffness = 1e7', ("PENALTY",)),
-        (
-            "",
-            'law = "penalty"\nstiffness = 1e7\nfriction_law = "coulomb"',
-            ("COULOMB", "PENALTY", "SOFT_FRICTION"),
-        ),
-        (
-            '"contact.friction_law" = ["sliding", "coulomb"]',
-            'law = "penalty"\nstiffness = 1e7',
-            ("COULOMB", "PENALTY", "SOFT_FRICTION"),
-        ),
-        (
-            '"contact.law" = ["lagrange", "penalty"]',
-            'friction_law = "coulomb"\nstiffness = 1e7',
-            ("COULOMB", "PENALTY", "SOFT_FRICTION"),
-        ),
-        ("", 'friction_law = "coulomb"', ("COULOMB",)),
-        ("", "restitution = 0.5", ("MANY_EVENTS", "RESTITUTION")),
-        ('"contact.restitution" = [0.0, 0.5]', "", ("MANY_EVENTS", "RESTITUTION")),
-        ("", 'normal = "updated"', ("CURVED",)),
-        ('"contact.normal" = ["fixed", "updated"]', "", ("CURVED",)),
-        ("", 'normal = "updated"\nlaw = "penalty"\nstiffness = 1e7', ("CURVED", "PENALTY")),
-        ("", 'friction_law = "stribeck"\nstribeck_speed = 1.0\nstatic_friction_ratio = 1.5', ("COULOMB",)),
-    ],
-)
-def test_a_version_of_some_laws_is_that_of_the_studies_that_take_them(tmp_path, axes, contact, further):
-    parts = [getattr(identity, name) for name in ("PHYSICS", "MODAL", *further)]
-    assert identity.physics_of(study_of(tmp_path, axes, contact)) == sum(parts)
-
-
-def test_restitution_has_a_version_by_the_central_difference_too(tmp_path):
-    rest = '[integrator]\nmethod = "central-difference"\nstep = "1 us"'
-    versions = [
-        identity.physics_of(study_of(tmp_path, "", contact, rest)) for contact in ("", "restitution = 0.5")
-    ]
-    assert versions == [identity.PHYSICS, identity.PHYSICS + identity.MANY_EVENTS]
-
-
-@pytest.mark.parametrize(
-    ("along", "further"), [("speed_ratio", ("BRANCHES", "ALONG_SPEED")), ("friction", ("BRANCHES",))]
-)
-def test_branches_have_a_version_and_those_along_a_speed_one_more(tmp_path, along, further):
-    plain = study_of(tmp_path)
-    followed = replace(plain, branch=BranchKeys(along=along))
-    assert identity.physics_of(followed) - identity.physics_of(plain) == sum(
-        getattr(identity, name) for name in further
-    )
 
 
 def test_quantities_are_axes_in_si_units(tmp_path):

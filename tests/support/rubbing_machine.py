@@ -28,13 +28,13 @@ revolutions = 12
 """
 
 
-def linear(misaligned: bool, turns: int, noise: float) -> dict[str, np.ndarray]:
-    """Signals without contact, by the machine's matrices; with a force and a torque at twice the speed."""
+def linear(misaligned: bool, turns: int, noise: float, node: int = 1) -> dict[str, np.ndarray]:
+    """Signals without contact, by the machine's matrices; with forces at a node and a torque at 2X."""
     model = assemble(read_rig("mokhtar2017"))
     lines = {1: steady_response(model, SPIN)}
     if misaligned:
         force = np.zeros(model.rotor.n_dof, complex)
-        force[model.rotor.index(1, "v")], force[model.rotor.index(1, "w")] = 20.0, -12.0j
+        force[model.rotor.index(node, "v")], force[model.rotor.index(node, "w")] = 20.0, -12.0j
         force[next(i for i, (_, name) in enumerate(model.rotor.degrees) if name == "thx")] = 0.3
         lines[2] = harmonic_response(model, SPIN, 2, force)
     time = np.arange(int(turns * 2 * np.pi / SPIN * 10e3)) / 10e3

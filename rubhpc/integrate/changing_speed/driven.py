@@ -25,6 +25,7 @@ from rubhpc.errors import InputError
 from rubhpc.integrate.changing_speed.free_piece import DRIVEN_LAG, Spin
 from rubhpc.integrate.changing_speed.run_up import RunUp
 from rubhpc.integrate.changing_speed.turns import Turns, bring_to_angles
+from rubhpc.integrate.marches.march import ended_in
 from rubhpc.integrate.measuring.measures import LEAST_EXCHANGE
 from rubhpc.integrate.measuring.samples import empty_samples
 from rubhpc.study.speed_law import LONGEST_PIECE, piece_length
@@ -146,7 +147,7 @@ def integrate_driven(
                 begins[turn + 1] = taken.times[i + 1]
         if passed.reason:
             n_done = at // per_revolution + len(passed.accumulators) - 1
-            reason = f"{passed.reason} in revolution {n_done + 1}"
+            reason = ended_in(passed.reason, n_done + 1)
             break
         energies += taken.energies
         at += length

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,14 +11,10 @@ from numpy.typing import NDArray
 from rubhpc.integrate.case import MARCHES
 from rubhpc.integrate.changing_speed.range_library import RangeLibrary
 from rubhpc.integrate.marches.collocation import CollocationMarch
-from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.marches.met_modes import NoClosedForm
-from rubhpc.integrate.marches.modal import Place
-from rubhpc.integrate.measuring.samples import empty_samples, following_accumulator, stacked_accumulators
+from rubhpc.integrate.marches.modal import FAST, ModalMarch, Place
+from rubhpc.integrate.measuring.samples import empty_samples, following_accumulator
 from rubhpc.integrate.record import State
-from rubhpc.kernels.accumulators import Accumulator, Samples
-from rubhpc.kernels.case_progress import FINISHED, MODE_WANTED, PAUSED
-from rubhpc.kernels.pieces import FAST, PIECE, STANDING, TO_BEGIN, Pieces
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -26,7 +22,7 @@ if TYPE_CHECKING:
     from rubhpc.fem.model import Model
     from rubhpc.integrate.changing_speed.mode_courses import Eigenmodes
     from rubhpc.integrate.changing_speed.piece_setup import PieceSetup
-    from rubhpc.integrate.changing_speed.pieces import Block
+    from rubhpc.kernels.accumulators import Accumulator, Samples
 
 
 Floats = NDArray[np.float64]
@@ -40,21 +36,19 @@ class Ended(NamedTuple):
 
     setup: PieceSetup
     library: RangeLibrary
-    left: tuple[int, Floats]  # as of `EventDrivenMarch.reached_in`
+    left: tuple[int, Floats]  # as of `ModalMarch.reached_in`
     time: float  # s, since the piece began
     acceleration: float  # rad/s^2
 
 
-def carried(
-    before: Ended, jump: float, march: EventDrivenMarch | CollocationMarch, setup: PieceSetup
-) -> Floats | None:
+def carried(before: Ended, jump: float, march: ModalMarch, setup: PieceSetup) -> Floats | None:
     """Coordinates (2, m) of the end of a piece in the modes of the next one; None where they have none.
 
     Parameters
     ----------
     jump : float, rad/s^2
         Sudden change of the acceleration.
-    march : EventDrivenMarch or CollocationMarch
+    march : ModalMarch
         At the beginning of the next piece.
     """
     (mask, z), old, next_ = before.left, before.setup, march.library
@@ -96,132 +90,6 @@ def _inside(place: float) -> float:
     return min(max(place, -1.0), 1.0)
 
 
-class Stretch(NamedTuple):
-    """Results of consecutive pieces."""
-
-    n_piece: int
-    whole: Floats  # (n_row, n_sample), about the sag
-    sums: Accumulator  # (n_part, ...), of each revolution, or of each piece where that is less
-    last: Accumulator  # of the last part
-    n_step: int
-    end: Place
-    left: tuple[int, Floats]  # end of the last piece, as in `EventDrivenMarch.reached_in`
-
-
-def begin_stretch(
-    march: EventDrivenMarch,
-    setup: PieceSetup,
-    begun: Place,
-    since: float,
-    left: tuple[int, Floats] | None = None,
-) -> RangeLibrary | None:
-    """Begin a piece, to be continued in the same kernel call; None where it must be integrated alone.
-
-    It has begun either way. `left` is
-    where the piece before has ended (`EventDrivenMarch.reached_in`), of modes that follow the speed, `since`
-    the time from its middle to that of this one, s.
-    """
-    library = march.begin_tuned(setup, begun)
-    if not isinstance(library, RangeLibrary):
-        return None
-    if left is not None and library.follows(march.mask):
-        march.keep_fast(left, setup.spin, since)
-    return None if library.n_room == 1 or library.has_strange(march.met) else library
-
-
-def take_stretch(
-    march: EventDrivenMarch,
-    library: RangeLibrary,
-    block: Block,
-    first: int,
-    samples: Samples,
-    begun: Place,
-    earlier: tuple[Accumulator, float],
-    look: Callable[[int], None],
-) -> Stretch | None:
-    """Integrate the pieces from `first` on, as far as possible; None where that is not possible.
-
-    Parameters
-    ----------
-    march : EventDrivenMarch or CollocationMarch
-        Whose case it is, at the beginning of the first of them (`begin_stretch`, whose library this is); it
-        stands nowhere afterwards, until it begins again.
-    block : Block
-        Pieces of the same matrices.
-    samples : Samples
-        Room for those of one piece.
-    begun, earlier
-        As in `Passing.take`.
-    """
-    speeds, n_piece, model = block.speeds, min(len(block), library.window_end), block.model
-    n_row, n_sample = samples.whole.shape
-    part = min(n_sample, block.held.template.samples_per_revolution)
-    n_part = n_sample // part
-    q, n = march.bodies.gap_jacobian.shape
-    lasts = n_sample * speeds.interval
-    pieces = Pieces(
-        spin=speeds.spin[:n_piece],
-        growth=speeds.growth[:n_piece],
-        tick=speeds.tick[:n_piece],
-        search_level=block.search_level[:n_piece],
-        force=block.force[:n_piece],
-        since=np.array([earlier[1] if i == first else lasts[i - 1] for i in range(n_piece)]),
-        table=library.filled(march.met),
-        n_room=library.n_room,
-        n_sample=n_sample,
-        n_part_sample=part,
-        energy_limit=block.held.template.energy_limit,
-        at=np.array([first, 0, TO_BEGIN, march.mask]),
-        follows=library.follows(march.mask),
-        left=march.reached_in()[1],
-        motion=np.zeros((n_piece + 1, 2 * n)),
-        pressing=np.zeros((n_piece + 1, q)),
-        seen=np.empty((2, 3 + model.n_place)),
-        n_step=np.zeros(n_piece, dtype=np.int64),
-        whole=np.empty((n_row, n_piece * n_sample)),
-    )
-    pieces.motion[first], pieces.pressing[first] = march.begun_motion, begun.contact_force
-    sums = stacked_accumulators(1 + n_piece * n_part, earlier[0])
-    for field, value in zip(sums, earlier[0], strict=True):
-        field[first * n_part] = value
-    seen = march.seen()
-    while True:
-        outcome = march.advance_through(pieces, samples, sums)
-        if outcome not in (MODE_WANTED, PAUSED):
-            break
-        look(int(pieces.at[PIECE]))
-        if outcome == MODE_WANTED:
-            library.reach(int(pieces.at[PIECE]))
-            march.find_wanted()
-            if library.has_strange(march.met):  # from here on piece by piece
-                march.step_back(pieces)
-                break
-            pieces = pieces._replace(table=library.filled(march.met))
-    end = int(pieces.at[PIECE])
-    assert end == n_piece or outcome != FINISHED
-    has_lost = any(
-        march.has_lost_events(
-            int(pieces.n_step[i]), float(lasts[i]), pieces.motion[i + 1], pieces.pressing[i + 1] > 0.0
-        )
-        for i in range(first, end)
-    )
-    if has_lost:  # each is integrated alone
-        pieces.seen[:] = seen
-        march.step_back(pieces)
-    if end == first or has_lost:
-        return None
-    parts = slice(1 + first * n_part, 1 + end * n_part)
-    return Stretch(
-        n_piece=end - first,
-        whole=pieces.whole[:, first * n_sample : end * n_sample],
-        sums=Accumulator._make(field[parts] for field in sums),
-        last=Accumulator._make(field[end * n_part] for field in sums),
-        n_step=int(pieces.n_step.sum()),
-        end=Place(pieces.motion[end].copy(), model.sag, pieces.pressing[end].copy()),
-        left=(int(pieces.at[STANDING]), pieces.left),
-    )
-
-
 class Passed(NamedTuple):
     """Result of a piece."""
 
@@ -245,11 +113,10 @@ class Passing:
     ) -> None:
         self._case = clearance, friction
         self._check, self._say = check, say
-        self._march: EventDrivenMarch | CollocationMarch | None = None
+        self._march: ModalMarch | None = None
         self.left: tuple[int, Floats] | None = None  # end of the last piece, in modal coordinates
         self._lasted = 0.0  # s, duration of that piece
         self._room: dict[int, Samples] = {}  # by number of samples of a piece
-        self._at: PieceSetup | None = None  # the piece at whose beginning the march is
 
     def anew(self) -> Passing:
         """Another one of the same case, which has not begun."""
@@ -274,10 +141,8 @@ class Passing:
         try:
             march = self._begin(setup, n_sample, begun, goes_on=goes_on)
             passed = self._pass(march, setup, n_sample, earlier, is_balanced)
-            if isinstance(march, EventDrivenMarch):
-                lasts, closed = setup.interval * n_sample, march.closed(march.mask)
-                if march.has_lost_events(passed.n_step, lasts, march.motion(), closed):
-                    raise NoClosedForm
+            if march.has_lost_events(setup.interval * n_sample):
+                raise NoClosedForm
             return passed
         except NoClosedForm:  # contacts that chatter, or too many sets of them
             self._march = None
@@ -329,57 +194,18 @@ class Passing:
             return False
         return bool((self._march.gaps(setup, begun) >= 0.0).all())
 
-    def take_several(
-        self,
-        block: Block,
-        first: int,
-        n_sample: int,
-        begun: State | Place,
-        earlier: tuple[Accumulator, float],
-        *,
-        goes_on: bool = False,
-    ) -> Stretch | None:
-        """Integrate pieces with the same matrices from `first` on, as many as possible; None for none."""
-        if not isinstance(self._march, EventDrivenMarch) or not isinstance(begun, Place):
-            return None
-        if self._check is not None:
-            self._check()
-        room = self._room_for(block.model, n_sample)
-        left = self.left if goes_on else None
-        march, setup = self._march, block[first]
-        try:
-            library = begin_stretch(march, setup, begun, self._longer(setup, n_sample), left)
-        except NoClosedForm:
-            return None
-        if library is None:
-            self._at = setup
-            return None
-
-        def look(piece: int) -> None:
-            self._look(block[min(piece, len(block) - 1)])
-
-        found = take_stretch(march, library, block, first, room, begun, earlier, look)
-        if found is not None:
-            self.left, self._lasted = found.left, float(block.interval[first + found.n_piece - 1]) * n_sample
-        return found
-
     def _longer(self, setup: PieceSetup, n_sample: int) -> float:
         """Duration, s, of the last piece or of the next one, whichever is longer."""
         return max(self._lasted, setup.interval * n_sample)
 
-    def _begin(
-        self, setup: PieceSetup, n_sample: int, begun: State | Place, *, goes_on: bool
-    ) -> EventDrivenMarch | CollocationMarch:
+    def _begin(self, setup: PieceSetup, n_sample: int, begun: State | Place, *, goes_on: bool) -> ModalMarch:
         """The march at the beginning of a piece."""
-        march, at, self._at = self._march, self._at, None
+        march = self._march
         if march is not None and isinstance(begun, Place):
-            if at is setup:
-                return march
             march.begin(setup, begun)
         else:
             made = MARCHES[setup.scheme](setup, *self._case, state_at(begun, setup), self._check)
-            assert isinstance(made, EventDrivenMarch | CollocationMarch)
-            self._march = march = made
+            self._march = march = cast("ModalMarch", made)
             if goes_on:
                 mask, z = march.reached_in()
                 self.left = mask, np.zeros_like(z)
@@ -387,9 +213,7 @@ class Passing:
             self._keep_fast(march, setup, n_sample)
         return march
 
-    def _keep_fast(
-        self, march: EventDrivenMarch | CollocationMarch, setup: PieceSetup, n_sample: int
-    ) -> None:
+    def _keep_fast(self, march: ModalMarch, setup: PieceSetup, n_sample: int) -> None:
         """Let fast modes that follow the speed continue unchanged."""
         library = march.library
         if self.left is not None and isinstance(library, RangeLibrary) and library.follows(march.mask):
@@ -397,7 +221,7 @@ class Passing:
 
     def _pass(
         self,
-        march: EventDrivenMarch | CollocationMarch,
+        march: ModalMarch,
         setup: PieceSetup,
         n_sample: int,
         earlier: tuple[Accumulator, float],

@@ -13,7 +13,7 @@ from rubhpc.fem.statics import at_rest_under
 from rubhpc.integrate.changing_speed.mode_courses import between
 from rubhpc.integrate.changing_speed.range_library import AT_ONCE, RangeLibrary, TableBuffer
 from rubhpc.integrate.modal_setup import ModalSetup
-from rubhpc.integrate.reduced_model.flight_modes import FlightModes
+from rubhpc.integrate.reduced_model.flight_modes import FlightModes, motion_rows
 from rubhpc.integrate.reduced_model.reduction import reduced_sag
 
 if TYPE_CHECKING:
@@ -111,6 +111,11 @@ class HeldMatrices:
         return with_values(self.reduced, **values)
 
     @cached_property
+    def local_motions(self) -> Floats:
+        """Local motions of each pair, which do not follow the speed."""
+        return motion_rows(self.reduced, self.model, self.template.accuracy)
+
+    @cached_property
     def _at_nodes(self) -> dict[str, list[Floats]]:
         """Arrays of the model that depend on the speed, at `mode_courses.NODES`."""
         nodes = [self.reduced, *(reduced for _, reduced in self._beside)]
@@ -185,6 +190,16 @@ class PieceSetup(ModalSetup):
     def within(self) -> float:
         """Place of the speed in the range of the matrices, from -1 to 1."""
         return float(self.speeds.within[self.place])
+
+    @property
+    def has_energies(self) -> bool:
+        """Whether energies are requested."""
+        return self.held.is_balanced
+
+    @property
+    def local_motions(self) -> Floats:
+        """Local motions of each pair, at all speeds of the same range."""
+        return self.held.local_motions
 
     def goes_on_in(self, other: PieceSetup, acceleration: float, next_acceleration: float) -> bool:
         """Whether the next piece has matrices of the same range that follow the speed."""

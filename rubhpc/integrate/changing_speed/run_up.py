@@ -20,6 +20,7 @@ from rubhpc.integrate.changing_speed.passing import Passing, state_at
 from rubhpc.integrate.changing_speed.pieces import Pieces
 from rubhpc.integrate.changing_speed.turns import Turns, bring_to_angles
 from rubhpc.integrate.changing_speed.twist_ramp import moved, sag_ramp
+from rubhpc.integrate.marches.march import ended_in
 from rubhpc.integrate.marches.modal import Place
 from rubhpc.integrate.measuring.samples import empty_samples, lift_samples, new_accumulator, probe_part
 from rubhpc.integrate.record import State
@@ -176,20 +177,7 @@ def integrate_run_up(
         while not reason and (place := piece - begins_at) < len(block):
             first = int(cuts[piece])
             note(first / cuts[-1])
-            stretch, before_it, follows = None, (earlier, before[piece]), goes_on or place > 0
-            if not late[piece]:
-                stretch = passing.take_several(
-                    block, place, size, reached, before_it, goes_on=goes_on or place > 0
-                )
-            if stretch is not None:
-                part = min(size, per_revolution)
-                parts = np.arange(first, first + stretch.n_piece * size, part)
-                gathered.add_all(parts // per_revolution, stretch.sums)
-                whole[:, first : first + stretch.n_piece * size] = stretch.whole
-                reached, earlier = stretch.end, stretch.last
-                n_step += stretch.n_step
-                piece += stretch.n_piece
-                continue
+            before_it, follows = (earlier, before[piece]), goes_on or place > 0
             passed = passing.take(block[place], size, reached, before_it, goes_on=follows)
             reached, earlier = passed.end, passed.accumulators[-1]
             if late[piece]:  # the inertia of the twist does not follow immediately
@@ -202,7 +190,7 @@ def integrate_run_up(
                 gathered.add(first // per_revolution + i, accumulator)
             if passed.reason:
                 n_done = first // per_revolution + len(passed.accumulators) - 1
-                reason = f"{passed.reason} in revolution {n_done + 1}"
+                reason = ended_in(passed.reason, n_done + 1)
             piece += 1
         if ramp is not None:
             ramp.lift(whole[:, cuts[begins_at] : cuts[piece]], setup)

@@ -58,13 +58,7 @@ class Turns:
         self._waiting = []
         names = (*_SUMMED, "friction_work", "least_slip", "peak_force", "peak_lateral")
         new = {name: np.array([getattr(one, name) for one in accumulators]) for name in names}
-        self._add(list(turns), new)
-
-    def add_all(self, turns: Ints, sums: Accumulator) -> None:
-        """Add accumulators of parts of a record: (n,) revolutions and (n, ...) sums."""
-        self._add(turns, sums._asdict())
-
-    def _add(self, at: Any, new: dict[str, Any]) -> None:
+        at = list(turns)
         together = self.together
         np.add.at(self.contact_time, at, new["contact_time"])
         np.add.at(self.friction_work, at, new["friction_work"])

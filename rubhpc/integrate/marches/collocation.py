@@ -68,12 +68,14 @@ class Contacts(NamedTuple):
     memory: NDArray[Any]  # (1,)
 
 
-WHY = {  # a case cannot continue
+SOFTER = 'a softer contact (law = "penalty" or "hertz"), or another accuracy'
+WHY = {  # a case cannot continue; then what may help
     0: "the motion diverges",
-    JAMMED: "friction presses a closed gap further closed (Painleve's paradox): lower the friction",
-    UNCONVERGED: "the contact forces of the shortest step were not found",
-    ENDLESS: "events follow without end",
-    SINGULAR: NO_FORCES,
+    JAMMED: "friction presses a closed gap further closed (Painleve's paradox); lower the friction",
+    UNCONVERGED: "the contact forces of the shortest step were not found; set "
+    f'friction_law = "coulomb" if friction is to end where slip does, {SOFTER}',
+    ENDLESS: f"events follow without end; set {SOFTER}, lower the restitution, or give the stator more mass",
+    SINGULAR: f"{NO_FORCES}; lower the friction, or set {SOFTER}",
 }
 
 
@@ -171,7 +173,7 @@ class CollocationMarch(ModalMarch):
         return 0, self._case.x.reshape(2, -1).copy()
 
     def keep_fast(self, before: tuple[int, Floats], spin: float, since: float) -> None:
-        """Let fast modes go on as they were before a piece (`EventDrivenMarch.keep_fast`)."""
+        """Let fast modes go on as they were before a piece (`ModalMarch.keep_fast`)."""
         z, fast = self._case.x.reshape(2, -1), np.abs(self._contacts.exponent) > slowest_fast(spin, since)
         fast[-1] = False  # the response to the unbalance
         z[:, fast] = before[1][:, : fast.size][:, fast]

@@ -11,11 +11,10 @@ from rubhpc.integrate.marches.march import ALL_SAMPLES
 from rubhpc.integrate.marches.met_modes import MetModes, NoClosedForm
 from rubhpc.integrate.marches.modal import ModalMarch, slowest_fast
 from rubhpc.integrate.measuring.samples import no_record
-from rubhpc.kernels.case_progress import FINISHED, MODE_WANTED, NO_SECTIONS, PAUSED, Sections, restart_clock
+from rubhpc.kernels.case_progress import MODE_WANTED, NO_SECTIONS, Sections, restart_clock
 from rubhpc.kernels.contact_modes import DYING, FORCED_LEVEL
 from rubhpc.kernels.event_loop import advance
 from rubhpc.kernels.mode_change import EventWork, change_contacts, event_work
-from rubhpc.kernels.piece_loop import advance_pieces
 from rubhpc.kernels.sampling import Measured
 
 if TYPE_CHECKING:
@@ -29,7 +28,6 @@ if TYPE_CHECKING:
     from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
     from rubhpc.kernels.accumulators import Accumulator, Samples
     from rubhpc.kernels.case_progress import Progress
-    from rubhpc.kernels.pieces import Pieces
 
     Floats = NDArray[np.float64]
 
@@ -64,24 +62,19 @@ class EventDrivenMarch(ModalMarch):
         """Set of contacts in which the case stands, and a copy of its modal coordinates (2, m)."""
         return self.mask, self._z.copy()
 
-    def has_lost_events(self, n_step: int, lasts: float, motion: Floats, closed: NDArray[np.bool_]) -> bool:
+    def has_lost_events(self, lasts: float) -> bool:
         """Whether a piece of a duration (s) took far more steps than short ones, or missed an event.
 
-        Then a pair that is not `closed` (q,) overlaps at its end by far more than an event leaves.
+        Then an open pair overlaps at its end by far more than an event leaves.
         """
-        bodies = self.bodies
+        bodies, motion = self.bodies, self.motion()
         gap = bodies.clearance + bodies.gap_jacobian @ motion[: motion.size // 2]
-        deepest = float(gap[~closed].min(initial=0.0))
-        is_endless = n_step > MOST_STEPS * lasts / self._setup.step
+        deepest = float(gap[~self.touching()].min(initial=0.0))
+        is_endless = self.n_step > MOST_STEPS * lasts / self._setup.step
         return is_endless or deepest < -LOST * max(bodies.overlap, LEAST)
 
     def keep_fast(self, before: tuple[int, Floats], spin: float, since: float) -> None:
-        """Let fast modes go on as they were before a piece began at another speed, in the same contacts.
-
-        `spin` (rad/s) is that of the piece, `since` the time from the middle of the one before to its own, s.
-
-        Modes follow the speed, which changes evenly, and do not ring for it (`kernels.pieces.begin_piece`).
-        """
+        """Let fast modes go on as they were before a piece (`ModalMarch.keep_fast`)."""
         mask, z = before
         if self.mask == mask:
             self._keep(z, slowest_fast(spin, since))
@@ -114,57 +107,6 @@ class EventDrivenMarch(ModalMarch):
         """Enter a contact mode from the motion."""
         self.find(mask)
         self._start(self.library.masks.index(mask))
-
-    def begin_tuned(self, setup: ModalSetup, place: Place) -> ModeLibrary:
-        """Begin where a kernel takes piece after piece."""
-        self.begin(setup, place)
-        return self.library
-
-    @property
-    def constants(self) -> Floats:
-        """Values of the coordinates that do not move."""
-        return self._entered_with
-
-    @property
-    def begun_motion(self) -> Floats:
-        """Reduced displacements, then velocities (2 n,), with which a piece begins."""
-        return self._motion
-
-    @property
-    def met(self) -> set[int]:
-        """Sets of closed contacts that this piece has met, or is expected to meet."""
-        return self._modes.met
-
-    def advance_through(self, pieces: Pieces, samples: Samples, sums: Accumulator) -> int:
-        """Advance through several pieces by a kernel that begins them (`kernels.piece_loop`).
-
-        What it saw of a piece that it could not take to the end is forgotten.
-        """
-        outcome = self._advance_pieces(pieces, samples, sums)
-        if outcome not in (FINISHED, MODE_WANTED, PAUSED):
-            self.step_back(pieces)
-        return outcome
-
-    def seen(self) -> Floats:
-        """A copy of the signals at the last sample, with their rates (`Recorder.last`)."""
-        return self._recorder.last.copy()
-
-    def step_back(self, pieces: Pieces) -> None:
-        """Forget what was seen of the piece under way."""
-        self._recorder.last[:] = pieces.seen
-
-    def _advance_pieces(self, pieces: Pieces, samples: Samples, sums: Accumulator) -> int:
-        return advance_pieces(
-            self.tables,
-            self.bodies,
-            self.clock,
-            pieces,
-            self._bare_progress,
-            self._coordinates,
-            self._event_work,
-            Measured(self._recorder, samples, sums),
-            NO_SECTIONS,
-        )
 
     def pass_sections(
         self, n_revolution: int, samples: Samples, accumulator: Accumulator

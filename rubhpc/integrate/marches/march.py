@@ -21,6 +21,12 @@ STEPS_A_SECOND = 5e5  # half of the rate of every integrator
 NO_FORCES = "no contact forces that obey the laws were found"  # reason of an end
 
 
+def ended_in(reason: str, revolution: int) -> str:
+    """Return why a case cannot continue, with the revolution, before what may help."""
+    what, *fix = reason.split("; ", 1)
+    return "; ".join([f"{what} in revolution {revolution}", *fix])
+
+
 class March(ABC):
     """A running case; sample 0 is the first recorded one, the transient lies before it."""
 

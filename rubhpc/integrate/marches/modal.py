@@ -26,7 +26,6 @@ from rubhpc.kernels.case_progress import (
     restart_clock,
 )
 from rubhpc.kernels.contact_modes import enter_with, is_within
-from rubhpc.kernels.pieces import FAST, QUICK
 from rubhpc.kernels.sampling import recorder, with_coordinates
 
 if TYPE_CHECKING:
@@ -34,12 +33,16 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.model import Model
     from rubhpc.integrate.modal_setup import ModalSetup
+    from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
     from rubhpc.kernels.accumulators import Accumulator, Samples
     from rubhpc.kernels.case_progress import Progress
     from rubhpc.kernels.contact_modes import ModeTables
 
 Floats = NDArray[np.float64]
 
+# Frequency of a mode over the spin, and times the duration of a piece, above which it continues unchanged
+# where the speed changes.
+FAST, QUICK = 3.0, 0.5 * np.pi
 # Kernels that are not compiled read fields as attributes, which a plain structured array has none of.
 _BEGUN = new_progress(1) if config.DISABLE_JIT else bare(new_progress(1))  # type: ignore[attr-defined]
 
@@ -54,7 +57,7 @@ class Place(NamedTuple):
 
 
 def slowest_fast(spin: float, since: float) -> float:
-    """Pace, 1/s, above which modes follow the speed from piece to piece (`kernels.pieces.begin_piece`)."""
+    """Pace, 1/s, above which modes follow the speed from piece to piece: these do not ring for it."""
     return max(FAST * abs(spin), QUICK / since)
 
 
@@ -134,6 +137,32 @@ class ModalMarch(March):
     @abstractmethod
     def pair_states(self) -> int:
         """States of all pairs as one number."""
+
+    @property
+    @abstractmethod
+    def mask(self) -> int:
+        """Set of closed pairs in whose modes the motion is."""
+
+    @property
+    @abstractmethod
+    def library(self) -> ModeLibrary:
+        """Contact modes of the case."""
+
+    @abstractmethod
+    def reached_in(self) -> tuple[int, Floats]:
+        """The set of closed pairs `mask`, and a copy of the modal coordinates (2, m)."""
+
+    @abstractmethod
+    def keep_fast(self, before: tuple[int, Floats], spin: float, since: float) -> None:
+        """Let fast modes go on as they were before a piece began at another speed, in the same contacts.
+
+        `spin` (rad/s) is that of the piece, `since` the time from the middle of the one before to its own, s.
+        Modes follow the speed, which changes evenly, and do not ring for it.
+        """
+
+    def has_lost_events(self, lasts: float) -> bool:
+        """Whether a piece of a duration (s) had events without end, or missed one."""
+        return False
 
     @abstractmethod
     def begin(self, setup: ModalSetup, place: Place) -> None:

@@ -62,6 +62,11 @@ class Verdict(NamedTuple):
     repeats: bool = False  # the record is that of the motion itself
 
 
+def undecided(vertical: Floats, horizontal: Floats, samples_per_revolution: int, is_contact: bool) -> Verdict:
+    """Judge no record, where the regime is not asked for."""
+    return Verdict(flag=REGIME.index("undecided"), period=0)
+
+
 def regime(
     vertical: Floats,
     horizontal: Floats,

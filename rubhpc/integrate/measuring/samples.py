@@ -82,12 +82,6 @@ def following_accumulator(before: Accumulator, passed: float) -> Accumulator:
     )
 
 
-def stacked_accumulators(n: int, before: Accumulator) -> Accumulator:
-    """Zero accumulators of n parts of a record, (n, ...) each, with the pairs and places of `before`."""
-    new = new_accumulator(before.impulse.size, before.peak_lateral.size)
-    return Accumulator._make(np.repeat(field[np.newaxis], n, axis=0) for field in new)
-
-
 def _accumulator(n_stator: int, n_place: int, **window: Any) -> Accumulator:
     """Zero accumulator except for the window of the mean force; a run-up makes one per revolution."""
     contact_time, impulse, stick_time, friction_work, peak_force, least_slip, turned = np.zeros((7, n_stator))

@@ -87,6 +87,14 @@ class Settings(Protocol):
         """Resolution of events, s."""
 
     @property
+    def has_energies(self) -> bool:
+        """Whether records have the losses by damping and the works of turning forces."""
+
+    @property
+    def local_motions(self) -> Floats:
+        """Local motions of each pair (`motion_rows`)."""
+
+    @property
     def n_level(self) -> int:
         """Levels for which exponentials are tabulated."""
 
@@ -175,7 +183,7 @@ class FlightModes:
     @cached_property
     def local(self) -> Floats:
         """Local motions of all pairs from the reduced displacements (R, n)."""
-        local = motion_rows(self.setup.reduced, self.setup.model, self.setup.accuracy)
+        local = self.setup.local_motions.copy()
         local[:, ACROSS] *= self.sense
         local[:, TWIST] *= self.sense
         return local.reshape(-1, local.shape[2])
@@ -309,7 +317,9 @@ class FlightModes:
         left, right, sign, n_loss, power = self._powers()
         tables, n_x = self.tables, self.motion.shape[1]
         k, n_seen = tables.is_filled.size, (s - 1) * (smooth.size + rough.size + len(power)) + smooth.size
-        gained, drift = energy_forms(self.exponent, self.n_complex, power, left, right, sign, n_loss)
+        gained, drift = np.zeros((2, 2, n_x, n_x))
+        if len(power):
+            gained, drift = energy_forms(self.exponent, self.n_complex, power, left, right, sign, n_loss)
         return Signals(
             value=self.rows(at @ displaced + moving @ going + driven @ pushed),
             direct=np.ascontiguousarray(driven @ self.local.T),
@@ -336,6 +346,9 @@ class FlightModes:
         Returns the places of both factors of each product, its sign, the number of losses, and the rows.
         """
         reduced, n = self.setup.reduced, self.local.shape[1]
+        if not self.setup.has_energies:
+            none = np.zeros(0, dtype=np.int64)
+            return none, none, np.zeros(0), 0, np.zeros((0, self.motion.shape[1]))
         displaced, going = self.shape[:n], self.shape[n:]
         size, shape = np.linalg.eigh(0.5 * (reduced.damping + reduced.damping.T))
         keep = np.abs(size) > UNSEEN * max(np.abs(size).max(), UNSEEN)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -130,7 +132,21 @@ def fill_events(
 
 
 @linked_sum
-def first_event(bodies: Bodies, nodes: Nodes, state: Ints, solution: Solution) -> tuple[float, int, int]:
+def return_place(parts: float, comes: float, sunk: float) -> float:
+    """Place in [0, 1] where a gap is back where it was, by its rates (m/s) at both ends and their mean.
+
+    Of a cubic: a parabola comes back late where the acceleration fades, and rebounds would not shrink.
+    """
+    if parts <= 0.0:
+        return 0.0
+    bend, twist = 3.0 * (sunk - parts) - (comes - parts), (comes - parts) - 2.0 * (sunk - parts)
+    return float(2.0 * parts / (math.sqrt(bend * bend - 4.0 * twist * parts) - bend))
+
+
+@linked_sum
+def first_event(
+    bodies: Bodies, nodes: Nodes, step: float, state: Ints, solution: Solution
+) -> tuple[float, int, int]:
     """Place of the first event in a step, its pair and its kind, NORMAL or FRICTION; place 2 without one."""
     s, event = nodes.at.size, solution.event
     place, pair, kind = NO_ROOT, -1, NORMAL
@@ -146,9 +162,10 @@ def first_event(bodies: Bodies, nodes: Nodes, state: Ints, solution: Solution) -
             if k == s:
                 continue
             begin = nodes.at[k]
-            if values[k] <= 0.0:  # it has opened and closed before the node: as a parabola does
-                parts, comes = solution.seen[i * s, RATE], solution.seen[i * s + k, RATE]
-                root = begin * min(1.0, max(LEAST_PART, 2.0 * parts / (parts - comes)))
+            if values[k] <= 0.0:  # it has opened and come back before the node
+                sunk = (values[k] - values[0]) / (begin * step)
+                back = return_place(solution.seen[i * s, RATE], solution.seen[i * s + k, RATE], sunk)
+                root = begin * max(LEAST_PART, back)
                 if root < place:
                     place, pair, kind = root, i, NORMAL
                 continue

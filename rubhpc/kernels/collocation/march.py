@@ -254,6 +254,7 @@ def take_event(
     else:
         solution.waiting[pair] = True
         state[pair] = STICKING
+        stop_slip(bodies, s, pair, solution, x)
         memory.slot = max(memory.slot - 4, lowest)
     memory.slot = min(memory.slot, top)
 
@@ -298,7 +299,8 @@ def strike(
         if not solution.touching[i]:
             continue
         see_rates(bodies, s, i, solution)
-        if not solution.bound[i] and (solution.impulse[i, NORMAL] == 0.0 or bodies.restitution[i] > 0.0):
+        may_rebound = bodies.restitution[i] > 0.0 and not solution.kept[i]  # what was closed and is hit stays
+        if not solution.bound[i] and (solution.impulse[i, NORMAL] == 0.0 or may_rebound):
             rate = solution.seen[i * s, RATE]
             if rate > PARTED * (bodies.rim_speed[i] + approach) + 1e-12:
                 state[i], solution.waiting[i] = OPEN, False
@@ -604,7 +606,7 @@ def advance_by_collocation(
                     memory.why = UNCONVERGED if why == 0 else why
                     return CONTACT_UNSOLVED
             fill_events(bodies, nodes, state, solution.guess, accuracy, solution)
-            place, pair, kind = first_event(bodies, nodes, state, solution)
+            place, pair, kind = first_event(bodies, nodes, step, state, solution)
             if pair >= 0 and memory.length == 0 and slot > 0:  # so soon after another event
                 memory.slot = slot - 1
                 continue
@@ -615,11 +617,13 @@ def advance_by_collocation(
                 if state[pair] == OPEN:
                     acceleration = acceleration_of(nodes, step, solution.seen[pair * s : pair * s + s])
                     if solution.seen[pair * s, RATE] > 0.0:
-                        taken = max(taken, 1)  # what opens does not touch at once: such touches have no end
+                        # Neither at once, nor faster than it has left: such rebounds have no end.
+                        taken = max(int(place * whole), 1)
             else:
                 pair = -1
             if taken == 0 and memory.n_at_once > UNDECIDED * state.size and pair >= 0:
                 taken, pair = whole, -1
+                memory.n_at_once = 0
             if progress.tick + taken > last_tick:
                 taken, pair = last_tick - progress.tick, -1
             if taken > 0:

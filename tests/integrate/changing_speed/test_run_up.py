@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import xarray as xr
 from closed_form import Contact, run_up, simulate
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
@@ -13,10 +12,8 @@ from trial_rig import trial_rig
 
 from rubhpc import LumpedStator, Rig, Unbalance
 from rubhpc.errors import InputError
-from rubhpc.integrate.changing_speed import passing
 from rubhpc.integrate.changing_speed.run_up import integrate_run_up
 from rubhpc.integrate.setup import prepare
-from rubhpc.kernels.pieces import Pieces
 from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.spectra import track_orders
 from rubhpc.study.initial import Initial
@@ -259,50 +256,6 @@ def test_a_law_of_constant_speed_is_a_simulation():
 
 DRIVEN = {"drive": {"start": 100.0, "torque": 1.0, "revolutions": 9}}
 SPRINGS, STICK = {"law": "penalty", "stiffness": 1e6}, {"friction_law": "coulomb"}
-
-
-@pytest.mark.parametrize("pieces", [None, 8])
-def test_pieces_together_are_pieces_one_by_one(monkeypatch, pieces):
-    """From before the contact on, with pieces of a part of a revolution, of one and of several."""
-    case = {"clearance": "60 um", "friction": 0.2, "samples_per_revolution": 64}
-    law = {"speed_law": [(0.0, 200.0), (0.6, 240.0), (3.0, 250.0)], "pieces_per_revolution": pieces}
-    together = run_up(trial_rig(2), **law, **case)
-    taken = []
-
-    def refuse(*args):
-        taken.append(args)
-
-    monkeypatch.setattr("rubhpc.integrate.changing_speed.passing.take_stretch", refuse)
-    apart = run_up(trial_rig(2), **law, **case)
-    assert taken
-    assert np.count_nonzero(apart.contact_fraction) > 10
-    for name in apart:
-        values = np.abs(apart[name].values)
-        scale = math.pi if name.startswith("phase") else values[np.isfinite(values)].max()
-        assert together[name].values == pytest.approx(apart[name].values, abs=1e-9 * scale, nan_ok=True), name
-
-
-def test_what_was_seen_of_pieces_that_fail_together_is_forgotten(monkeypatch):
-    """Every stretch ends with its first part, beyond its limit of energy: its pieces are taken one by one."""
-    case = {"clearance": "60 um", "friction": 0.2, "samples_per_revolution": 64}
-    law = {"speed_law": [(0.0, 200.0), (0.6, 240.0), (3.0, 250.0)], "pieces_per_revolution": 8}
-    take_stretch = passing.take_stretch
-    monkeypatch.setattr(passing, "take_stretch", lambda *_: None)
-    apart = run_up(trial_rig(2), **law, **case)
-    monkeypatch.setattr(passing, "Pieces", lambda **fields: Pieces(**(fields | {"energy_limit": -1.0})))
-    n_failed = 0
-
-    def fail(march, *given):
-        nonlocal n_failed
-        before = march._recorder.last.copy()
-        assert take_stretch(march, *given) is None
-        assert np.array_equal(march._recorder.last, before, equal_nan=True)
-        n_failed += 1
-
-    monkeypatch.setattr("rubhpc.integrate.changing_speed.passing.take_stretch", fail)
-    together = run_up(trial_rig(2), **law, **case)
-    assert n_failed > 10
-    xr.testing.assert_identical(together, apart)
 
 
 def test_bearings_have_their_coefficients_at_the_speed_reached():

@@ -19,6 +19,7 @@ from rubhpc.fem.beam import stator_foreshortening
 from rubhpc.integrate import case
 from rubhpc.integrate.marches import collocation
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
+from rubhpc.integrate.marches.march import ended_in
 from rubhpc.integrate.scheme import Scheme
 from rubhpc.recent import forget
 from rubhpc.rig.reading import with_keys
@@ -393,3 +394,46 @@ def test_a_force_that_only_turns_takes_long_steps():
     coarse, fine = records[0], rubhpc.simulate(rig, **given, transient=30, revolutions=4, accuracy=1e-6)
     assert coarse.friction_work == pytest.approx(fine.friction_work, rel=1e-5)
     assert coarse.peak_contact_force == pytest.approx(fine.peak_contact_force, rel=1e-4)
+
+
+STEEL = {"youngs_modulus": 1.5e11, "length": 0.028, "geometry": "second_order", "count": 8}
+STIFF = {"youngs_modulus": 3e10, "geometry": "linear", "count": 8}
+SMALL = {"youngs_modulus": 2e10, "geometry": "linear", "count": 12, "radius": 0.006}
+HIT = {"clearance": "50 um", "normal": "updated", "transient": 0, "revolutions": 4, "keep": ()}
+
+
+@pytest.mark.parametrize(
+    ("stator", "given", "touches"),
+    [
+        pytest.param(  # the acceleration that brings a tip back fades within a step
+            STEEL,
+            {"speed_ratio": 2.9, "friction": 0.0, "restitution": 0.7, "friction_law": "sliding"},
+            100,
+            id="fading",
+        ),
+        pytest.param(  # rebounds of a few ticks that lose less than the tick rounds
+            STIFF, {"speed_ratio": 2.98, "friction": 0.4, "restitution": 0.95}, 1000, id="ticks"
+        ),
+        pytest.param(  # impacts of one press others that have closed a tick before
+            SMALL,
+            {"speed_ratio": 0.86, "friction": 0.4, "restitution": 0.5, "friction_law": "sliding"},
+            250,
+            id="neighbours",
+        ),
+    ],
+)
+def test_rebounds_in_a_ring_come_to_rest(stator, given, touches):
+    rig = read_rig("mokhtar2017")
+    rig = with_keys(replace(rig, stator=(replace(rig.stator[0], **stator),)), {"rotor.gravity": 9.81})
+    record = rubhpc.simulate(rig, **HIT, **given)
+    assert record.reason == ""
+    assert record.energy_residual < 5e-4
+    assert 1 < record.contacts_per_revolution.sum() < touches
+
+
+@pytest.mark.parametrize("reason", collocation.WHY.values())
+def test_reason_of_an_end_names_the_revolution_before_what_may_help(reason):
+    said = ended_in(reason, 7)
+    what, _, fix = said.partition(" in revolution 7")
+    assert what + fix == reason
+    assert ";" not in what
