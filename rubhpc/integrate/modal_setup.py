@@ -12,7 +12,6 @@ import numpy as np
 
 from rubhpc.integrate.measuring.divergence import energy_limit
 from rubhpc.integrate.reduced_model.contact_mode import ContactMode, solve_contact_mode
-from rubhpc.integrate.reduced_model.flight_modes import FlightModes
 from rubhpc.integrate.reduced_model.flight_modes import FlightModes, motion_rows
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
 from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions, kernel_bodies
