@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rubhpc.integrate.measuring.divergence import energy_limit
-from rubhpc.integrate.reduced_model.contact_mode import ContactMode, confine, solve_contact_mode
+from rubhpc.integrate.reduced_model.contact_mode import ContactMode, solve_contact_mode
 from rubhpc.integrate.reduced_model.flight_modes import FlightModes, motion_rows
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
 from rubhpc.integrate.reduced_model.reduction import ReducedModel, directions, kernel_bodies
-from rubhpc.integrate.reduced_model.system_modes import KeptParts, solve_parts
 from rubhpc.integrate.reduced_model.touching import OpenBodies, open_bodies
 from rubhpc.integrate.reduced_model.truncation import (
     MOST_MODES,
@@ -35,7 +34,6 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.free_spin import FreeSpin
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.reduced_model.system_modes import Solved
     from rubhpc.kernels.contact_modes import Reduced
     from rubhpc.kernels.laws import Law
 
@@ -169,7 +167,7 @@ class ModalSetup:
     def _opened(self) -> ContactMode:
         """Contact mode with every pair open, which does not depend on friction."""
         gap_jacobian, force_direction, _ = directions(self.reduced, self.model, 0.0)
-        return solve_contact_mode(self.reduced, gap_jacobian, force_direction, 0, self._known_of_ring)
+        return solve_contact_mode(self.reduced, gap_jacobian, force_direction, 0)
 
     @cached_property
     def flight_modes(self) -> FlightModes:
@@ -209,7 +207,6 @@ class ModalSetup:
                 self.model,
                 friction,
                 opened=self._opened,
-                known=self._known_of_ring,
                 tick=self.tick,
                 sample_level=self.sample_level,
                 n_level=self.n_level,
@@ -222,18 +219,6 @@ class ModalSetup:
     def _among(self) -> OpenBodies | None:
         """Several stators while open."""
         return open_bodies(self.reduced, self.model, self._opened)
-
-    @cached_property
-    def _known(self) -> Solved:
-        """The parts of the system with every pair open; those of several stators' contact modes join them."""
-        n = self.reduced.stiffness.shape[0]
-        opened = solve_parts(confine(self.reduced, np.zeros((0, n)), np.zeros((n, 0)))[2])
-        return KeptParts(opened) if len(self.model.stators) > 1 else opened
-
-    @property
-    def _known_of_ring(self) -> Solved:
-        """The same for several stators; for one stator nothing is looked up."""
-        return self._known if len(self.model.stators) > 1 else {}
 
     @property
     def n_byte(self) -> dict[float, int]:
@@ -255,5 +240,3 @@ class ModalSetup:
         """Free the contact modes of a friction."""
         self._bodies.pop(friction, None)
         self._libraries.pop(friction, None)
-        if not self._libraries:  # and the shared parts, except those with every pair open
-            vars(self).pop("_known", None)

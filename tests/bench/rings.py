@@ -35,7 +35,7 @@ def show(count: int) -> None:
         simulate(rig, clearance_ratio=clearance, **case)
         seconds.append(time.process_time() - began)
     setups = [found for found in gc.get_objects() if isinstance(found, ModalSetup)]
-    n_mode = max(setup.n_mode(FRICTION) for setup in setups)
+    n_mode = max(setup.n_solved(FRICTION) for setup in setups)
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     print(f"| {count} | {n_mode} | {seconds[0]:.2g} s | {seconds[1]:.2g} s | {memory:.2g} GB |", flush=True)
 

@@ -10,11 +10,9 @@ from trial_rig import trial_rig
 
 from rubhpc import LumpedStator
 from rubhpc.integrate.carried_tangent import CarriedTangent
-from rubhpc.integrate.marches import met_modes
 from rubhpc.integrate.periodic_motions.collocated_motion import CollocatedMotion
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.periodic_motions.shooting import shoot
-from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
 from rubhpc.integrate.setup import prepare
 from rubhpc.study.study import Integrator
 
@@ -63,18 +61,6 @@ def test_columns_are_those_of_the_monodromy_of_each_revolution(rig, law):
         assert off < 1e-9 * motion.size(known[:, 0])
     motion.stand_at(motion.start, motion.states)
     assert motion.go_on(columns, N_REVOLUTION) == pytest.approx(known, rel=1e-6, abs=1e-6 * abs(known).max())
-
-
-def test_contact_modes_without_room_change_nothing(monkeypatch):
-    """Tables that hold fewer modes than a motion meets: the same tangent to the last bit."""
-
-    def grown():
-        return CarriedTangent(motion_of(trial_rig(3), SPEED, 5, {}, 40e-6)).part(N_REVOLUTION)
-
-    expected = grown()
-    monkeypatch.setattr(ModeLibrary, "_most_modes", 4)
-    monkeypatch.setattr(met_modes, "MOST_REFILLS", 1000)
-    assert grown() == expected
 
 
 @pytest.mark.parametrize("kind", [PiecewiseMotion, CollocatedMotion])

@@ -15,7 +15,6 @@ from rubhpc.integrate.changing_speed.range_library import AT_ONCE, RangeLibrary,
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.reduced_model.flight_modes import FlightModes, motion_rows
 from rubhpc.integrate.reduced_model.reduction import reduced_sag
-from rubhpc.integrate.reduced_model.system_modes import KeptParts
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
     from rubhpc.fem.model import Model
     from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
-    from rubhpc.integrate.reduced_model.system_modes import Solved
     from rubhpc.kernels.contact_modes import Reduced
     from rubhpc.kernels.filling import Speeds
 
@@ -65,7 +63,6 @@ class HeldMatrices:
         self.twist = self.lean = np.zeros(model.sag.size)  # sag under 1 N m of a drive; under 1 rad/s^2
         self.slope = np.zeros(model.sag.size)  # change of the sag with the speed
         self.sagging_models: list[Model] = []  # at `mode_courses.NODES`, where the sag depends on the speed
-        self.kept = KeptParts()
         self.bodies: dict[float, Reduced] = {}  # of each friction, without what a piece changes
         self.sample_level = sample_level  # of the lowest speed
         self.acceleration, self.momentum = acceleration, momentum
@@ -77,13 +74,13 @@ class HeldMatrices:
 
     @property
     def n_byte(self) -> int:
-        """Memory of the tables of contact modes and of kept parts, bytes."""
-        return self.kept.n_byte + sum(library.n_byte for library in self._libraries.values())
+        """Memory of the tables of contact modes, bytes."""
+        return sum(library.n_byte for library in self._libraries.values())
 
     def forget(self) -> None:
         """Free contact modes, which would wait for a garbage collection: libraries refer to this object."""
         self._libraries.clear()
-        self.kept, self.first = KeptParts(), None
+        self.first = None
 
     def serve(self, speed: float, acceleration: float, slope: float = 0.0) -> bool:
         """Whether a piece may use them."""
@@ -155,7 +152,6 @@ class HeldMatrices:
                 self.model,
                 friction,
                 phasor=self._phasor,
-                known=self.kept,
                 tick=piece.tick,
                 sample_level=piece.sample_level,
                 n_level=piece.n_level,
@@ -208,14 +204,6 @@ class PieceSetup(ModalSetup):
     def goes_on_in(self, other: PieceSetup, acceleration: float, next_acceleration: float) -> bool:
         """Whether the next piece has matrices of the same range that follow the speed."""
         return other.held is self.held and self.held.is_followed and next_acceleration == acceleration
-
-    @property
-    def _known_of_ring(self) -> Solved:
-        return self.held.kept
-
-    @cached_property
-    def _known(self) -> Solved:
-        return self.held.kept
 
     def bodies(self, friction: float, clearance: Floats) -> Reduced:
         """The reduced bodies of a case for kernels; clearance (q,), m."""

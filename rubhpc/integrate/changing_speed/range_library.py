@@ -22,8 +22,7 @@ from rubhpc.integrate.changing_speed.mode_courses import (
     followed,
     matched,
 )
-from rubhpc.integrate.reduced_model.mode_library import ModeLibrary, width_without_modes
-from rubhpc.integrate.reduced_model.mode_tables import energies_of
+from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
 from rubhpc.integrate.reduced_model.table_stack import TableStack
 from rubhpc.integrate.reduced_model.touching import OpenBodies, open_bodies
 from rubhpc.kernels.contact_modes import LANES, SAMPLES_AT_ONCE
@@ -37,9 +36,7 @@ if TYPE_CHECKING:
 
     from rubhpc.fem.model import Model
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode
-    from rubhpc.integrate.reduced_model.mode_tables import Energies
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
-    from rubhpc.integrate.reduced_model.system_modes import Solved
     from rubhpc.kernels.contact_modes import ModeTables
     from rubhpc.kernels.filling import ModeCourse
 
@@ -167,7 +164,6 @@ class RangeLibrary(ModeLibrary):
         friction: float,
         *,
         phasor: Complexes,
-        known: Solved,
         tick: float,
         sample_level: int,
         n_level: int,
@@ -179,7 +175,7 @@ class RangeLibrary(ModeLibrary):
         at_once: int = AT_ONCE,
     ) -> None:
         """Start with every pair open."""
-        self.reduced, self._known, self._reach = _struck(reduced, phasor), known, reach
+        self.reduced, self._reach = _struck(reduced, phasor), reach
         self._spin = reduced.spin
         self._is_measured, self._at_place, self._at_once = is_balanced, at_place, at_once
         self._take_pairs(model, friction)
@@ -188,8 +184,8 @@ class RangeLibrary(ModeLibrary):
         self._among: OpenBodies | None = None
         self._opened, self._is_open = self._solve(0), True
         self._among = open_bodies(reduced, model, self._opened)
-        self.first_masks = [0]
-        self.width = width_without_modes(reduced, model, friction, self._opened.exponent.size)
+        self._first_modes()
+        self.first_masks = [0]  # a piece begins with no other mode
         self._is_followed = bool(beside)
         self._beside = [self._with(other) for other in beside]
         self._exponents = {}
@@ -197,7 +193,7 @@ class RangeLibrary(ModeLibrary):
         self._strange: set[int] = set()  # modes that cannot be followed
         self._counted: tuple[tuple[int, ...], int] = (), 0  # modes, and their memory, bytes
         kind: tuple[object, ...] = type(self), self.width, n_level, is_balanced
-        buffer = TableBuffer(TableStack(1 + len(self.gap_jacobian), self._most_modes))
+        buffer = TableBuffer(TableStack(1 + len(self.gap_jacobian)))
         self._buffer = buffer if buffers is None else buffers.setdefault(kind, buffer)
         self._tables = self._buffer.tables
         self.n_room = 0  # tables that each mode has, for as many pieces
@@ -214,11 +210,6 @@ class RangeLibrary(ModeLibrary):
         self.add(0)
 
     @property
-    def followed(self) -> RangeLibrary:
-        """Itself: all of a run-up is recorded."""
-        return self
-
-    @property
     def n_byte(self) -> int:
         """Memory that its contact modes hold."""
         if self._counted[0] != (masks := tuple(self._held)):
@@ -230,11 +221,6 @@ class RangeLibrary(ModeLibrary):
             }
             self._counted = masks, sum(sizes.values())
         return self._counted[1]
-
-    @property
-    def is_tuned_ahead(self) -> bool:  # type: ignore[override]
-        """Whether a mode is filled for several pieces at once: pieces begin with those met before."""
-        return self.n_room > 1
 
     @property
     def n_most(self) -> int:
@@ -386,11 +372,9 @@ class RangeLibrary(ModeLibrary):
         shape, rate = mode.motion[:n], mode.motion[n:]
         resisting = np.zeros((0, mode.exponent.size), dtype=np.complex128)
         if self._is_measured:
-            reduced, friction = self.reduced, self._friction_of(mode)
+            reduced = self.reduced
             skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
-            resisting = reduced.damping @ rate + skew @ shape
-            if friction is not None:
-                resisting = resisting - friction
+            resisting = reduced.damping @ rate + skew @ shape - self._friction_of(mode)
         else:
             row = with_slip(row, self.slip @ rate, mode.exponent)
         return Node.of(mode, row, self._output, resisting)
@@ -411,10 +395,6 @@ class RangeLibrary(ModeLibrary):
             self._is_open, self._opened = True, self._solve(0)
             self._among = self._among.at(self.reduced, self._opened) if self._among else None
         return super()._solved(mask)
-
-    def _energies_of(self, mode: ContactMode) -> Energies:
-        """Energies of a mode, whose order is not that of open bodies."""
-        return energies_of(mode, self.reduced, self._friction_of(mode), self.width)
 
 
 def _struck(reduced: ReducedModel, phasor: Complexes) -> ReducedModel:

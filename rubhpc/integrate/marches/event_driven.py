@@ -49,7 +49,6 @@ class EventDrivenMarch(ModalMarch):
         """Start from `initial`, with the contacts closed that its forces press."""
         super().__init__(setup, clearance, friction, initial, check)
         self._event_work = event_work(self._clearance.size)
-        self._modes = MetModes()
         self._enter_first(initial.contact_force)
 
     def begin(self, setup: ModalSetup, place: Place) -> None:
@@ -101,7 +100,7 @@ class EventDrivenMarch(ModalMarch):
 
     def _enter_first(self, contact_force: Floats) -> None:
         """Enter the contact mode with which the case begins; forces (q,), N."""
-        self._modes.begin_piece(self._setup.library(self._coefficient))
+        self._modes = MetModes(self._setup.library(self._coefficient))
         self._enter(self._first_mask(contact_force))
 
     def _enter(self, mask: int) -> None:
@@ -117,7 +116,6 @@ class EventDrivenMarch(ModalMarch):
         level, first = self.clock.sample_level, -n_revolution * self.clock.samples_per_revolution
         restart_clock(self._bare_progress, first << level, first, is_recorded=False)
         self.sample, self._ended = first, None
-        self._take_library(self._modes.library_for(is_recorded=False))
         while self.sample < 0:
             outcome = self._advance_sections(samples, accumulator, sections)
             if outcome == MODE_WANTED:
@@ -146,21 +144,9 @@ class EventDrivenMarch(ModalMarch):
 
     def find_wanted(self) -> None:
         """See that the tables hold the set of contacts that the kernel asks for."""
-        mask = int(self._bare_progress["wanted"])
-        self._modes.ask_for(mask)
-        self.find(mask)
-
-    def _take_library(self, library: ModeLibrary) -> None:
-        """Go on with the tables of another library, in the same coordinates."""
-        if library is not self.library:
-            mask, z = int(self.tables.mask[self._bare_progress["mode"]]), self._z
-            self._modes.library = library
-            self.find(mask)
-            self._z[:] = z
-            self._bare_progress["mode"] = library.masks.index(mask)
+        self.find(int(self._bare_progress["wanted"]))
 
     def _kernel(self, last_tick: int, samples: Samples, accumulator: Accumulator, is_recorded: bool) -> int:
-        self._take_library(self._modes.library_for(is_recorded=is_recorded))
         while (outcome := self._advance(last_tick, samples, accumulator, is_recorded)) == MODE_WANTED:
             self.find_wanted()
         return outcome

@@ -54,7 +54,12 @@ def mode_of(march: EventDrivenMarch, states: int) -> Mode:
         translations=march.bodies.translations,
         displacement_limit=march.bodies.displacement_limit,
     )
-    return mode._replace(tables=followed)
+    return mode._replace(place=_place_of(march, states), tables=followed)
+
+
+def _place_of(march: EventDrivenMarch, states: int) -> int:
+    """Place of a mode in the tables of a march; those of another case of its library may differ."""
+    return int(np.flatnonzero(march.tables.mask == states)[0])
 
 
 def unknown_modes(tables: ModeTables) -> PieceModes:
@@ -91,7 +96,7 @@ def know(modes: PieceModes, mode: Mode) -> None:
 def _read_mode(march: EventDrivenMarch, states: int) -> Mode:
     """Take a mode from the tables of a march, for no clearance."""
     tables = march.tables
-    place = int(np.flatnonzero(tables.mask == states)[0])
+    place = _place_of(march, states)
     first = tables.n_eigenmode[place]
     offset = np.zeros((2, 3, tables.switch_re.shape[2]))
     offset[:, 0], offset[:, 1] = -tables.enter_cosine[place], -tables.enter_sine[place]

@@ -3,32 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import null_space
 
-from rubhpc.integrate.reduced_model.system_modes import count_modes, modes_of, parts_of
+from rubhpc.integrate.reduced_model.system_modes import modes_of, parts_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
-    from rubhpc.integrate.reduced_model.system_modes import Solved
 
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]
     Complexes = NDArray[np.complex128]
-
-
-class Places(NamedTuple):
-    """Places of the arrays of a contact mode of some pairs in that of all bodies."""
-
-    coordinate: Ints  # ascending
-    take_off: Ints  # rows
-    switch: Ints  # rows
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -50,20 +40,12 @@ class ContactMode:
         """Number of eigenmodes among the coordinates, m."""
         return len(self.enter)
 
-    @classmethod
-    def places(cls, own: int, m: int, q: int, pairs: Ints) -> Places:
-        """Places of `own` eigenmodes and these pairs (r,) among m eigenmodes and q pairs."""
-        return Places(
-            np.concatenate([np.arange(own), [m], m + 1 + pairs]), np.append([0, 1], 2 + pairs), pairs
-        )
-
 
 def solve_contact_mode(
     reduced: ReducedModel,
     gap_jacobian: Floats,
     force_direction: Floats,
     mask: int,
-    known: Solved | None = None,
 ) -> ContactMode:
     """Solve the linear system with the pairs of `mask` closed.
 
@@ -83,9 +65,9 @@ def solve_contact_mode(
     tangent, project, system = confine(reduced, rate, force)
     offset = np.zeros((q, n))  # displacement that closes a unit clearance
     if closed.size:
-        offset[closed] = _closing(rate.tobytes(), *rate.shape)
+        offset[closed] = -np.linalg.pinv(rate).T
     n_free = tangent.shape[1]
-    exponent, shape, inverse = modes_of(system, known)
+    exponent, shape, inverse = modes_of(system)
     phasor = reduced.force[0] - 1j * reduced.force[1]
     lower = np.concatenate([np.zeros(n_free), project @ phasor])
     response = steady_response(system, reduced.spin, lower, q)
@@ -146,13 +128,6 @@ def _at_rest(system: Floats, load: Floats, q: int) -> Floats:
     return found
 
 
-def count_coordinates(reduced: ReducedModel, gap_jacobian: Floats, force_direction: Floats, mask: int) -> int:
-    """Count the coordinates of the contact mode with the pairs of `mask` closed, m + 1 + q."""
-    closed = [i for i in range(len(gap_jacobian)) if mask >> i & 1]
-    _, _, system = confine(reduced, gap_jacobian[closed], force_direction[closed].T)
-    return count_modes(system) + 1 + len(gap_jacobian)
-
-
 def confine(reduced: ReducedModel, rate: Floats, force: Floats) -> tuple[Floats, Floats, Floats]:
     """Motions that keep gaps closed T (n, n_free), projection that removes contact forces, and the system.
 
@@ -178,25 +153,9 @@ def left_free(rate: Floats, force: Floats) -> tuple[Floats, Floats]:
     """Motions and projection of `confine`, which do not depend on the speed."""
     if not len(rate):
         return np.eye(len(force)), np.eye(len(force))
-    return _left_free(rate.tobytes(), np.ascontiguousarray(force).tobytes(), len(force))
-
-
-@lru_cache(maxsize=32)
-def _left_free(rate: bytes, force: bytes, n: int) -> tuple[Floats, Floats]:
-    """The same from `rate` (r, n) and `force` (n, r) as bytes."""
-    rows, directions = np.frombuffer(rate).reshape(-1, n), np.frombuffer(force).reshape(n, -1)
-    tangent, left = _null_space(rows), _null_space(directions.T)
+    tangent, left = _null_space(rate), _null_space(force.T)
     project = np.asarray(np.linalg.solve(left.T @ tangent, left.T), dtype=np.float64)
-    tangent.flags.writeable = project.flags.writeable = False
     return tangent, project
-
-
-@lru_cache(maxsize=32)
-def _closing(rate: bytes, r: int, n: int) -> Floats:
-    """Displacements (r, n) that close a unit clearance each, from `rate` (r, n)."""
-    found = -np.linalg.pinv(np.frombuffer(rate).reshape(r, n)).T
-    found.flags.writeable = False
-    return np.asarray(found)
 
 
 def _null_space(rows: Floats) -> Floats:

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from rubhpc.errors import InputError
 from rubhpc.fem.model import FAR_APART
-from rubhpc.integrate.reduced_model.contact_mode import ContactMode
 from rubhpc.kernels import contact_modes as kernel
 from rubhpc.kernels.contact_modes import LANES
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL
 
 if TYPE_CHECKING:
+    from rubhpc.integrate.reduced_model.contact_mode import ContactMode
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
 
     Ints = NDArray[np.int64]
@@ -35,59 +35,26 @@ class Energies(NamedTuple):
     work: NDArray[np.complex128]  # (2, m), J
     steady: Floats  # (2,), W, not contained in the forms
 
-    def add(self, columns: NDArray[np.int64], part: Energies) -> None:
-        """Add the energies of a part of the bodies, which has some of the coordinates."""
-        both = np.concatenate([columns, self.work.shape[1] + columns])
-        self.loss[both[:, None], both] += part.loss
-        self.work[:, columns] += part.work
-        self.steady[:] += part.steady
-
-    def padded(self, width: int) -> Energies:
-        """The same with further coordinates without energy."""
-        found = Energies.none(width)
-        found.add(np.arange(self.work.shape[1]), self)
-        return found
-
     @classmethod
     def none(cls, width: int) -> Energies:
         """Zeros."""
         return cls(np.zeros((2 * width, 2 * width)), np.zeros((2, width), dtype=complex), np.zeros(2))
 
 
-def energies_of(mode: ContactMode, reduced: ReducedModel, friction: Complexes | None, width: int) -> Energies:
-    """Energies of a contact mode, its coordinates padded to `width`.
+def energies_of(mode: ContactMode, reduced: ReducedModel, friction: Complexes, width: int) -> Energies:
+    """Primitives of the powers of damping and unbalance in a contact mode, its coordinates padded to `width`.
 
-    Parameters
-    ----------
-    friction : (n, m), N, optional
-        Friction forces on the motion with each coordinate; their loss is added to that of damping.
+    The loss includes that of `friction` (n, m), N, the friction forces on the motion with each coordinate,
+    whose power is the work of the drive against it less the heat. Products of two coordinates are
+    proportional to exp((l_k + l_j) t) or exp((l_k + conj l_j) t). Terms without a primitive are steady: the
+    product of the unbalance response with itself, and those of undamped modes, which have no loss.
     """
-    spare = width - mode.exponent.size
-    exponent, motion = np.pad(mode.exponent, (0, spare)), np.pad(mode.motion, ((0, 0), (0, spare)))
-    rubbing = np.zeros((len(motion) // 2, width), dtype=complex)
-    if friction is not None:
-        rubbing[:, : mode.exponent.size] = friction
-    return energy_forms(reduced, exponent, motion, rubbing, mode.n_eigenmode)
-
-
-def energy_forms(
-    reduced: ReducedModel,
-    exponent: Complexes,
-    motion: Complexes,
-    friction: Complexes,
-    n_eigenmode: int,
-) -> Energies:
-    """Primitives of the powers of damping and unbalance.
-
-    The loss includes that of `friction` (n, m), whose power on the motion is the work of the drive against it
-    less the heat. Products of two coordinates are proportional to exp((l_k + l_j) t) or exp((l_k + conj l_j)
-    t). Terms without a primitive are steady: the product of the unbalance response with itself, and those of
-    undamped modes, which have no loss.
-    """
-    n = reduced.stiffness.shape[0]
+    spare, response = width - mode.exponent.size, mode.n_eigenmode
+    exponent = np.pad(mode.exponent, (0, spare))
+    shape, rate = np.split(np.pad(mode.motion, ((0, 0), (0, spare))), 2)
+    rubbing = np.pad(friction, ((0, 0), (0, spare)))
     skew = 0.5 * (reduced.stiffness - reduced.stiffness.T)
-    shape, rate = motion[:n], motion[n:]
-    resisting = reduced.damping @ rate + skew @ shape - friction
+    resisting = reduced.damping @ rate + skew @ shape - rubbing
     phasor = reduced.force[0] - 1j * reduced.force[1]
     turning = np.full(exponent.shape, 1j * reduced.spin)
     powers = rate.T @ resisting, rate.T @ resisting.conj()
@@ -98,10 +65,7 @@ def energy_forms(
             _primitive(phasor.conj() @ rate, exponent - turning),
         ]
     )
-    steady = np.zeros(2, dtype=complex)
-    if exponent.size > n_eigenmode:
-        response = rate[:, n_eigenmode]
-        steady[:] = response @ resisting[:, n_eigenmode].conj(), response @ phasor.conj()
+    steady = rate[:, response] @ np.stack([resisting[:, response], phasor], axis=1).conj()
     return Energies(loss, work, 0.5 * steady.real)
 
 
@@ -214,41 +178,6 @@ def tabulate(
     )
     fields: list[Any] = [np.ascontiguousarray(np.asarray(field)[None]) for field in row]
     return kernel.ModeTables(*fields)
-
-
-def bytes_ahead(tables: kernel.ModeTables, reduced: ReducedModel, n_ahead: int, n_level: int) -> int:
-    """Memory that the tables of a mode would take with so many samples ahead, and levels of exponentials."""
-    m = tables.pace.shape[1]
-    n_place = len(reduced.degree) + len(reduced.carrier)
-    n_output = n_ahead * (kernel.N_ROTOR_ROW + 3 * n_place + reduced.probe.shape[1])
-    columns = -(-n_output // LANES) * LANES - tables.output.shape[2]
-    levels = n_level - tables.power_re.shape[1]
-    return int(sum(field.nbytes for field in tables) + 2 * m * (columns + levels) * tables.pace.itemsize)
-
-
-def mode_of(row: kernel.ModeTables, exponents: Floats) -> ContactMode:
-    """Return the contact mode that tables (1, ...) and exponents (`mode_library.ModeLibrary.exponents`) hold.
-
-    The result equals the tabulated mode bit for bit.
-    """
-    m, q = int(row.n_eigenmode[0]), row.enter_constant.shape[1]
-    end = m + 1 + q
-    halves = np.concatenate([row.enter_cosine, row.enter_sine, row.enter_constant[0]])  # (2 + q, 2, m)
-    return ContactMode(
-        mask=int(row.mask[0]),
-        exponent=_joined(exponents[0, :end], exponents[1, :end]),
-        motion=_joined(row.motion_re[0, :, :end], row.motion_im[0, :, :end]),
-        enter=_joined(row.enter_re[0, :, :m], row.enter_im[0, :, :m]).T,
-        take_off=_joined(halves[:, 0, :m], halves[:, 1, :m]),
-        switch=_joined(row.switch_re[0, :, :end], row.switch_im[0, :, :end]),
-    )
-
-
-def _joined(real: Floats, imaginary: Floats) -> Complexes:
-    """Complex numbers of these parts, including the signs of zeros."""
-    joined = np.empty(real.shape, dtype=np.complex128)
-    joined.real, joined.imag = real, imaginary
-    return joined
 
 
 def _outputs(

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from functools import lru_cache
-from hashlib import blake2b
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +17,6 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
-    Solved = dict[bytes, tuple[Complexes, Complexes, Complexes]]  # parts, by their names (`_name_of`)
 
 
 ROUNDING = 100 * np.finfo(np.float64).eps  # difference of two equal exponents, over the norm of the system
@@ -29,8 +25,6 @@ WORST_BALANCED = 1e7  # condition of all eigenvectors; for a defective system ab
 REAL = 1e-12  # imaginary part of a real exponent, over the greatest
 
 WORST_CONDITION = 1e11  # of the eigenvectors; above it their sums lose digits, and they are separated
-SMALL = 64  # states of a part that is kept
-MOST_BYTES = 2**29  # of parts that are kept
 
 
 def separate(system: Floats) -> tuple[Complexes, Complexes, Complexes] | None:
@@ -88,47 +82,17 @@ def _equal(exponent: Complexes, tolerance: float) -> list[NDArray[np.int64]]:
     return [at for at in places if at.size > 1]
 
 
-class KeptParts(dict[bytes, "tuple[Complexes, Complexes, Complexes]"]):
-    """Cache of solved parts for `modes_of`, which adds new ones; the oldest are dropped."""
-
-    def __init__(self, parts: Solved | None = None) -> None:
-        super().__init__()
-        self.n_byte = 0
-        for part, solved in (parts or {}).items():
-            self.keep(part, solved)
-
-    def keep(self, part: bytes, solved: tuple[Complexes, Complexes, Complexes]) -> None:
-        """Add a new part."""
-        self[part] = solved
-        self.n_byte += _size(part, solved)
-        while self.n_byte > MOST_BYTES and len(self) > 1:
-            oldest = next(iter(self))
-            self.n_byte -= _size(oldest, self.pop(oldest))
-
-
-def _size(part: bytes, solved: tuple[Complexes, Complexes, Complexes]) -> int:
-    return len(part) + sum(values.nbytes for values in solved)
-
-
-def modes_of(system: Floats, known: Solved | None = None) -> tuple[Complexes, Complexes, Complexes]:
+def modes_of(system: Floats) -> tuple[Complexes, Complexes, Complexes]:
     """Exponents, shapes and inverse shapes of a first-order system; one of each conjugate pair, doubled.
 
-    Uncoupled parts are solved separately: in a ring only the stators that touch move with the rotor. Parts in
-    `known`, such as open stators, are not solved again; `KeptParts` adds the others.
+    Uncoupled parts are solved separately: in a ring only the stators that touch move with the rotor.
     """
     n_state = len(system)
     exponents: list[Complexes] = [np.zeros(0, dtype=np.complex128)]  # a mass on a rigid wall has no modes
     shapes: list[Complexes] = [np.zeros((n_state, 0), dtype=np.complex128)]
     inverses: list[Complexes] = [np.zeros((0, n_state), dtype=np.complex128)]
     for rows in coupled_rows(system != 0.0):
-        part = system[np.ix_(rows, rows)]
-        name = _name_of(part) if known else b""
-        solved = known.get(name) if known else None
-        if solved is None:
-            solved = solve_part(part)
-            if isinstance(known, KeptParts):
-                known.keep(name or _name_of(part), solved)
-        exponent, shape, inverse = solved
+        exponent, shape, inverse = solve_part(system[np.ix_(rows, rows)])
         wide, tall = np.zeros((2, n_state, exponent.size), dtype=np.complex128)
         wide[rows], tall[rows] = shape, inverse.T
         exponents.append(exponent)
@@ -138,24 +102,9 @@ def modes_of(system: Floats, known: Solved | None = None) -> tuple[Complexes, Co
 
 
 def solve_part(part: Floats) -> tuple[Complexes, Complexes, Complexes]:
-    """Exponents, shapes and inverse shapes of an uncoupled part of a system.
-
-    Small parts are cached, such as an open stator, which is the same at every speed.
-    """
-    worst = WORST_CONDITION
-    return _recalled(part.tobytes(), worst) if len(part) <= SMALL else _solve_part(part, worst)
-
-
-@lru_cache(maxsize=32)
-def _recalled(part: bytes, worst: float) -> tuple[Complexes, Complexes, Complexes]:
-    """The same of a part (n, n) as bytes."""
-    n = math.isqrt(len(part) // 8)
-    return _solve_part(np.frombuffer(part).reshape(n, n), worst)
-
-
-def _solve_part(part: Floats, worst: float) -> tuple[Complexes, Complexes, Complexes]:
+    """Exponents, shapes and inverse shapes of an uncoupled part of a system."""
     exponent, shape = np.linalg.eig(part)
-    inverse = _inverse(shape, worst)
+    inverse = _inverse(shape)
     if inverse is None and (separated := separate(part)) is not None:
         exponent, shape, inverse = separated
     if inverse is None:
@@ -172,37 +121,20 @@ def _solve_part(part: Floats, worst: float) -> tuple[Complexes, Complexes, Compl
     )
 
 
-def _inverse(shape: Complexes, worst: float) -> Complexes | None:
-    """Inverse of eigenvectors, or None if their condition is worse; Frobenius norms are tried first."""
+def _inverse(shape: Complexes) -> Complexes | None:
+    """Inverse of eigenvectors, or None if their condition is too bad; Frobenius norms are tried first."""
     try:
         inverse = np.linalg.inv(shape)
     except np.linalg.LinAlgError:
         return None
     bound = np.linalg.norm(shape) * np.linalg.norm(inverse)
-    return np.asarray(inverse) if bound <= worst or np.linalg.cond(shape) <= worst else None
-
-
-def solve_parts(system: Floats) -> Solved:
-    """All parts of a system, solved, for `modes_of`."""
-    parts = (system[np.ix_(rows, rows)] for rows in coupled_rows(system != 0.0))
-    return {name: solve_part(part) for name, part in {_name_of(part): part for part in parts}.items()}
-
-
-def _name_of(part: Floats) -> bytes:
-    """Key of a part: its bytes, or their digest if they are many."""
-    values = part.tobytes()
-    return values if len(part) <= SMALL else blake2b(values, digest_size=32).digest()
+    is_well = bound <= WORST_CONDITION or np.linalg.cond(shape) <= WORST_CONDITION
+    return np.asarray(inverse) if is_well else None
 
 
 def parts_of(system: Floats, q: int) -> list[NDArray[np.int64]]:
     """Rows of each uncoupled part; all rows for one pair, where separation saves little."""
     return coupled_rows(system != 0.0) if q > 1 else [np.arange(len(system))]
-
-
-def count_modes(system: Floats) -> int:
-    """Count the eigenmodes of a system, one of each conjugate pair."""
-    exponents = (np.linalg.eigvals(system[np.ix_(rows, rows)]) for rows in coupled_rows(system != 0.0))
-    return sum(int(np.count_nonzero(_kept(exponent.astype(np.complex128))[1])) for exponent in exponents)
 
 
 def _kept(exponent: Complexes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:

@@ -19,7 +19,7 @@ _FLOATS = np.dtype(np.float64)
 MOST_MODES = 1024  # sets of closed contacts of one speed and friction
 FIRST_ROOM = 2  # for a contact-free case and one that enters a contact
 NEXT_ROOM = 16  # for a case that keeps rubbing; then for all, because growing copies
-MOST_BYTES = 2**30  # of their tables
+MOST_BYTES = 3 * 2**30  # of their tables
 _KEPT = 2**24  # bytes of an array up to which the C library keeps freed memory
 
 # It takes arrays smaller than the largest freed one from its heap, which keeps twice as much (mallopt(3)).
@@ -58,30 +58,23 @@ class TableStack:
     Attributes
     ----------
     n_most : int
-        Most modes: those of each pair closed alone, and as many further sets as `n_most` and `most_bytes`
+        Most modes: those of each pair closed alone, and as many further sets as MOST_MODES and MOST_BYTES
         allow.
     """
 
-    def __init__(self, n_least: int, n_most: int = MOST_MODES, most_bytes: int = MOST_BYTES) -> None:
-        self._most_bytes = most_bytes
-        self.n_most = max(n_least, n_most)
+    def __init__(self, n_least: int) -> None:
+        self.n_most = max(n_least, MOST_MODES)
         self._n_least, self._n_filled, self._n_written = n_least, 0, 0
-        self._vacant: int | None = None  # place for the next mode
         self._room: list[Any] = []
         self._view: Any = None
 
     def add(self, row: Any, count: int = 1) -> None:
         """Add the tables of a mode, a named tuple of (1, ...) each, `count` times."""
         rows: list[Any] = list(row)
-        if self._vacant is not None:
-            for field, new in zip(self._room, rows, strict=True):
-                field[self._vacant] = new[0]
-            self._vacant = self._view = None
-            return
         first, end = self._n_filled, self._n_filled + count
         if not self._room:
             n_bytes = sum(field.nbytes for field in rows)
-            self.n_most = max(self._n_least, min(self.n_most, self._most_bytes // n_bytes))
+            self.n_most = max(self._n_least, min(self.n_most, MOST_BYTES // n_bytes))
             n_room = max(count, min(self._n_least, FIRST_ROOM))
             self._room = [room_for((n_room, *field.shape[1:]), field.dtype) for field in rows]
             self._kind = type(row)
@@ -97,25 +90,12 @@ class TableStack:
 
     def clear(self) -> None:
         """Free all places for new contact modes."""
-        self._n_filled, self._view, self._vacant = 0, None, None
-
-    def vacate(self, place: int) -> None:
-        """Free the place of a mode for the next one."""
-        self._vacant = place
+        self._n_filled, self._view = 0, None
 
     @property
     def n_byte(self) -> int:
         """Allocated memory, bytes."""
-        return self.n_byte_of_one * self._n_written
-
-    def row(self, place: int) -> Any:
-        """The tables of one mode, (1, ...) each."""
-        return self._kind(*(field[place : place + 1] for field in self._room))
-
-    @property
-    def n_byte_of_one(self) -> int:
-        """Memory of the tables of one mode, bytes."""
-        return sum(field[0].nbytes for field in self._room)
+        return sum(field[: self._n_written].nbytes for field in self._room)
 
     def view(self) -> Any:
         """The tables of all contact modes."""

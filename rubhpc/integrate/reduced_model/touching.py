@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,6 @@ from numpy.typing import NDArray
 from rubhpc.integrate.reduced_model import reduction
 from rubhpc.integrate.reduced_model.contact_mode import solve_contact_mode
 from rubhpc.integrate.reduced_model.coupling import coupled_rows
-from rubhpc.integrate.reduced_model.mode_tables import Energies, energies_of, energy_forms
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,11 +18,8 @@ if TYPE_CHECKING:
     from rubhpc.fem.model import Model
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode, SlidingPairs
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
-    from rubhpc.integrate.reduced_model.system_modes import Solved
 
     Floats = NDArray[np.float64]
-    Complexes = NDArray[np.complex128]
-    M = TypeVar("M", bound="ContactMode")
 
 Ints = NDArray[np.int64]
 
@@ -44,33 +39,25 @@ class Touching(NamedTuple):
         """Rows of the closed pairs (r, n_own), from those of all (q, n)."""
         return np.ascontiguousarray(rows[self.pairs[:, None], self.rows])
 
-    def among_all(self, own: M, opened: M, n: int, q: int) -> M:
+    def among_all(self, own: ContactMode, opened: ContactMode, n: int, q: int) -> ContactMode:
         """The contact mode of all bodies, from that of these alone and that with every pair open.
 
         Switch functions of open pairs stay zero. `n` and `q` count the coordinates and pairs of all.
         """
-        first, states = own.n_eigenmode, _states(self.rows, n)
+        first, states = own.n_eigenmode, np.concatenate([self.rows, n + self.rows])
         m = first + self.spared.size
-        place = own.places(first, m, q, self.pairs)
-        columns, entered = place.coordinate, place.coordinate[: len(own.enter)]
-        end, n_entered = (size - opened.n_eigenmode + m for size in (opened.exponent.size, len(opened.enter)))
+        columns = np.concatenate([np.arange(first), [m], m + 1 + self.pairs])
+        end = m + 1 + q
         exponent, motion = np.zeros(end, dtype=np.complex128), np.zeros((2 * n, end), dtype=np.complex128)
         exponent[columns], motion[states[:, None], columns] = own.exponent, own.motion
         exponent[first:m], motion[:, first:m] = opened.exponent[self.spared], opened.motion[:, self.spared]
-        enter = np.zeros((n_entered, 2 * n), dtype=np.complex128)
-        enter[entered[:, None], states], enter[first:m] = own.enter, opened.enter[self.spared]
-        take_off = np.zeros((len(opened.take_off), n_entered), dtype=np.complex128)
-        take_off[place.take_off[:, None], entered] = own.take_off
-        switch = np.zeros((len(opened.switch), end), dtype=np.complex128)
-        switch[place.switch[:, None], columns] = own.switch
-        return replace(
-            own,
-            exponent=exponent,
-            motion=motion,
-            enter=enter,
-            take_off=take_off,
-            switch=switch,
-        )
+        enter = np.zeros((m, 2 * n), dtype=np.complex128)
+        enter[:first, states], enter[first:] = own.enter, opened.enter[self.spared]
+        take_off = np.zeros((2 + q, m), dtype=np.complex128)
+        take_off[np.append([0, 1], 2 + self.pairs), :first] = own.take_off
+        switch = np.zeros((q, end), dtype=np.complex128)
+        switch[self.pairs[:, None], columns] = own.switch
+        return replace(own, exponent=exponent, motion=motion, enter=enter, take_off=take_off, switch=switch)
 
 
 class OpenBodies:
@@ -85,15 +72,15 @@ class OpenBodies:
     """
 
     def __init__(self, reduced: ReducedModel, opened: ContactMode, seen: Floats) -> None:
-        self.opened, self._reduced, self._rows = opened, reduced, seen
+        self.opened, self._rows = opened, seen
         n = len(reduced.stiffness)
-        self._parts = coupled_rows((reduced.stiffness != 0.0) | (reduced.damping != 0.0))
+        parts = coupled_rows((reduced.stiffness != 0.0) | (reduced.damping != 0.0))
         self._part = np.empty(n, dtype=np.int64)  # of each coordinate
-        for number, rows in enumerate(self._parts):
+        for number, rows in enumerate(parts):
             self._part[rows] = number
         is_driven, is_seen = np.any(reduced.force != 0.0, axis=0), seen != 0.0
-        self._driven = np.array([is_driven[rows].any() for rows in self._parts])
-        self._seen = np.stack([is_seen[:, rows].any(axis=1) for rows in self._parts], axis=1)
+        self._driven = np.array([is_driven[rows].any() for rows in parts])
+        self._seen = np.stack([is_seen[:, rows].any(axis=1) for rows in parts], axis=1)
         is_moved = opened.motion[:, : opened.n_eigenmode] != 0.0
         self._of_mode = self._part[(is_moved[:n] | is_moved[n:]).argmax(axis=0)]  # part of each eigenmode
 
@@ -109,88 +96,20 @@ class OpenBodies:
             return None
         return Touching(closed, np.flatnonzero(own[self._part]), np.flatnonzero(~own[self._of_mode]))
 
-    def energies(
-        self,
-        mode: ContactMode,
-        reduced: ReducedModel,
-        friction: Complexes | None,
-        pairs: Sequence[int],
-        width: int,
-    ) -> Energies:
-        """Energies of a contact mode of these pairs, its coordinates padded to `width`.
-
-        `reduced` and `friction` (n, m), N, are those of `energies_of`.
-        """
-        if not pairs:
-            return self.opened_energies.padded(width)
-        touching = self.touching(pairs)
-        if touching is None:
-            return energies_of(mode, reduced, friction, width)
-        n, own = len(self._part), mode.n_eigenmode - touching.spared.size
-        columns = mode.places(own, mode.n_eigenmode, len(self._seen), touching.pairs).coordinate
-        found = Energies.none(width)
-        rubbing = np.zeros((touching.rows.size, columns.size), dtype=np.complex128)
-        if friction is not None:
-            rubbing += friction[touching.rows[:, None], columns]
-        part = energy_forms(
-            touching.model(reduced),
-            mode.exponent[columns],
-            mode.motion[_states(touching.rows, n)[:, None], columns],
-            rubbing,
-            own,
-        )
-        found.add(columns, part)
-        place = np.full(self.opened.exponent.size, -1)
-        place[touching.spared] = np.arange(own, mode.n_eigenmode)
-        at, value = self._opened_loss
-        row, column = (place[k % place.size] + k // place.size * width for k in at)
-        are_spared = (place[at % place.size] >= 0).all(axis=0)
-        found.loss[row[are_spared], column[are_spared]] = value[are_spared]
-        return found
-
-    @cached_property
-    def _opened_loss(self) -> tuple[Ints, Floats]:
-        """Places (2, k) and values of the nonzero energies of the open set."""
-        loss = self.opened_energies.loss
-        at = np.array(np.nonzero(loss))
-        return at, loss[tuple(at)]
-
-    @cached_property
-    def opened_energies(self) -> Energies:
-        """Energies of the open set, without padding; those of equal bodies are computed once."""
-        opened, n = self.opened, len(self._part)
-        found, known = Energies.none(opened.exponent.size), dict[bytes, Energies]()
-        for number, rows in enumerate(self._parts):
-            columns = np.flatnonzero(self._of_mode == number)
-            n_eigenmode = columns.size
-            if self._driven[number]:
-                columns = np.append(columns, opened.n_eigenmode)
-            model = self._reduced.part(rows, np.zeros(0, dtype=np.int64))
-            exponent, motion = opened.exponent[columns], opened.motion[_states(rows, n)[:, None], columns]
-            name = b"".join(
-                values.tobytes() for values in (model.stiffness, model.damping, model.force, exponent, motion)
-            )
-            if name not in known:
-                still = np.zeros((rows.size, columns.size), dtype=np.complex128)
-                known[name] = energy_forms(model, exponent, motion, still, n_eigenmode)
-            found.add(columns, known[name])
-        return found
-
 
 def mode_among(
     among: OpenBodies | None,
     reduced: ReducedModel,
     pairs: SlidingPairs,
     mask: int,
-    known: Solved | None,
 ) -> ContactMode:
     """The contact mode of a set of closed pairs, solved for the bodies that touch where there are others."""
     closed, (q, n) = pairs.closed(mask), pairs.gap_jacobian.shape
     touching = among.touching(closed) if among and closed else None
     if among is None or touching is None:
-        return solve_contact_mode(reduced, pairs.gap_jacobian, pairs.force_direction, mask, known)
+        return solve_contact_mode(reduced, pairs.gap_jacobian, pairs.force_direction, mask)
     rates, forces = touching.of_pairs(pairs.gap_jacobian), touching.of_pairs(pairs.force_direction)
-    own = solve_contact_mode(touching.model(reduced), rates, forces, (1 << len(closed)) - 1, known)
+    own = solve_contact_mode(touching.model(reduced), rates, forces, (1 << len(closed)) - 1)
     mode = replace(touching.among_all(own, among.opened, n, q), mask=mask)
     others = np.setdiff1d(np.arange(q), closed)
     mode.switch[others] = pairs.gap_jacobian[others] @ mode.motion[:n]
@@ -202,8 +121,3 @@ def open_bodies(reduced: ReducedModel, model: Model, opened: ContactMode) -> Ope
     """Open bodies of several stators; None for one stator, where nothing is saved."""
     gap_jacobian, _, slip = reduction.directions(reduced, model, 0.0)
     return OpenBodies(reduced, opened, np.abs(gap_jacobian) + np.abs(slip)) if len(slip) > 1 else None
-
-
-def _states(rows: Ints, n: int) -> Ints:
-    """Coordinates and their rates among displacements, then velocities, of n coordinates."""
-    return np.concatenate([rows, n + rows])

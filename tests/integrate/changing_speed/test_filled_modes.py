@@ -45,7 +45,7 @@ def tables_at(library, reduced, base, mask, levels):
     """Tables of a mode solved for a speed."""
     opened = solve_contact_mode(reduced, library.gap_jacobian, library.force_direction, 0)
     pairs = SlidingPairs(library.gap_jacobian, library.force_direction)
-    mode = mode_among(open_bodies(reduced, base.model, opened), reduced, pairs, mask, None)
+    mode = mode_among(open_bodies(reduced, base.model, opened), reduced, pairs, mask)
     return measured(mode, reduced, library.slip, library._friction_of(mode), **levels)
 
 
@@ -59,7 +59,6 @@ def test_a_tuned_mode_is_the_mode_at_that_speed(q):
         base.model,
         0.2,
         phasor=phasor,
-        known={},
         tick=base.tick,
         reach=40.0,
         **levels,
@@ -99,7 +98,7 @@ def test_energy_balances_while_the_unbalance_force_grows(growth):
     phasor = (base.reduced.force[0] - 1j * base.reduced.force[1]) / base.spin**2
     factor = (spin**2 - 40.0j) * np.exp(0.7j)
     levels = {"sample_level": base.sample_level, "n_level": base.n_level}
-    library = RangeLibrary(base.reduced, base.model, 0.2, phasor=phasor, known={}, tick=base.tick, **levels)
+    library = RangeLibrary(base.reduced, base.model, 0.2, phasor=phasor, tick=base.tick, **levels)
     library.tune(speeds_of([spin], [factor], [growth], [base.tick], base.spin, base.sample_level), 0)
     reduced, n, time = base.reduced, len(base.reduced.stiffness), 1e-3
     for mask in MASKS[3]:

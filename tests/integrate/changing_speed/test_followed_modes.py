@@ -62,7 +62,6 @@ def library_of(base, at):
         base.model,
         0.2,
         phasor=phasor,
-        known={},
         tick=base.tick,
         sample_level=base.sample_level,
         n_level=base.n_level,

@@ -18,12 +18,12 @@ from rubhpc.fem.response import steady_response
 from rubhpc.integrate.carried_tangent import CarriedTangent
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.marches import event_driven as event_driven_march
-from rubhpc.integrate.marches import march, met_modes
+from rubhpc.integrate.marches import march
 from rubhpc.integrate.marches.collocation import WHY
 from rubhpc.integrate.marches.march import NO_FORCES
 from rubhpc.integrate.measuring.divergence import energy_limit
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
-from rubhpc.integrate.reduced_model import mode_library
+from rubhpc.integrate.reduced_model import mode_library, table_stack
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
 from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.case_progress import CONTACT_UNSOLVED
@@ -40,6 +40,7 @@ from rubhpc.study.study import Integrator, Recording
 SPEED = 170.0
 RUB = {"speed": SPEED, "clearance": "80 um", "friction": 0.2, "transient": 1, "revolutions": 2}
 CLOSE = RUB | {"clearance": "40 um"}  # three stators are all met, two at a time
+FORGET = ModeLibrary.forget
 COUNTED = ("contacts_per_revolution", "contact_fraction", "contact_impulse", "peak_contact_force")
 
 
@@ -63,61 +64,58 @@ def test_shorter_kernel_calls_change_nothing_but_rounding(monkeypatch, n_stator,
     assert pieces.energy_residual == pytest.approx(usual.energy_residual, rel=1e-3)
 
 
+def crowd(library):
+    """Fill the tables with sets that other cases have met."""
+    for mask in (7, 6, 5):
+        library.add(mask)
+
+
 def test_sets_are_made_anew_where_there_is_no_room_for_all(monkeypatch):
-    """What is forgotten and met again is tabulated to the same numbers."""
-    usual = simulate(trial_rig(3), **CLOSE)
-    monkeypatch.setattr(ModeLibrary, "_most_modes", 4)
-    monkeypatch.setattr(met_modes, "MOST_REFILLS", 1000)
-    made = []
-    add = ModeLibrary.add
+    """What other cases have left in the tables does not change even the last bits."""
+    case = RUB | {"clearance": "60 um"}
+    usual = simulate(trial_rig(3), **case)
+    monkeypatch.setattr(table_stack, "MOST_MODES", 5)
+    taken, forgotten = ModeLibrary.__init__, []
 
-    def counted(book, mask):
-        made.append(mask)
-        return add(book, mask)
+    def crowded(library, *args, **settings):
+        taken(library, *args, **settings)
+        crowd(library)
 
-    monkeypatch.setattr(ModeLibrary, "add", counted)
+    monkeypatch.setattr(ModeLibrary, "__init__", crowded)
+    monkeypatch.setattr(ModeLibrary, "forget", lambda book: forgotten.append(book) or FORGET(book))
     forget()
-    crowded = simulate(trial_rig(3), **CLOSE)
-    assert len(made) > len(set(made))
-    check_close(crowded, usual, 1e-9)
-    assert crowded.peak_contact_force == pytest.approx(usual.peak_contact_force, rel=1e-7)
+    found = simulate(trial_rig(3), **case)
+    assert len(forgotten) == 1
+    assert found.left_closed_form == usual.left_closed_form == 0
+    for name in (*MOTIONS, *COUNTED):
+        assert np.array_equal(getattr(found, name), getattr(usual, name)), name
 
 
 @pytest.mark.parametrize("law", [{}, {"restitution": 0.5}])
-@pytest.mark.parametrize("few", [5, 2])
-def test_little_memory_holds_other_tables_between_records(monkeypatch, law, few):
-    """What is not recorded needs no outputs and energies, more pairs those of one sample: the same case."""
+def test_many_pairs_are_recorded_sample_by_sample(monkeypatch, law):
+    """Their tables hold the outputs of one sample: the same case."""
     usual = simulate(trial_rig(3), **CLOSE, **law)
-    monkeypatch.setattr(mode_library, "MOST_BYTES", 2**17)
-    monkeypatch.setattr(mode_library, "FEW_PAIRS", few)
-    recorded = []
-    add = ModeLibrary.add
-
-    def counted(library, mask):
-        is_wide_enough = add(library, mask)
-        recorded.append(library.tables().output.shape[2] > 0)
-        return is_wide_enough
-
-    monkeypatch.setattr(ModeLibrary, "add", counted)
+    monkeypatch.setattr(mode_library, "FEW_PAIRS", 2)
     forget()
-    crowded = simulate(trial_rig(3), **CLOSE, **law)
-    assert set(recorded) == {True, False}
-    assert crowded.left_closed_form == usual.left_closed_form == 0
-    check_close(crowded, usual, 1e-9)
-    assert crowded.peak_contact_force == pytest.approx(usual.peak_contact_force, rel=1e-7)
+    found = simulate(trial_rig(3), **CLOSE, **law)
+    assert found.left_closed_form == usual.left_closed_form == 0
+    check_close(found, usual, 1e-9)
+    assert found.peak_contact_force == pytest.approx(usual.peak_contact_force, rel=1e-7)
 
 
 def test_neighbours_do_not_depend_on_what_is_forgotten(monkeypatch):
     """Not even their last bits: other cases, which other ranks compute, fill the same tables."""
-    monkeypatch.setattr(met_modes, "MOST_REFILLS", 1000)
+    monkeypatch.setattr(table_stack, "MOST_MODES", 6)
     ratios = []
-    for most in (1024, 4):
-        monkeypatch.setattr(ModeLibrary, "_most_modes", most)
+    for is_crowded in (False, True):
         setup = prepare(
             trial_rig(3), SPEED, contact=Contact(), integrator=Integrator(), samples_per_revolution=64
         )
-        neighbours = CarriedTangent(PiecewiseMotion(setup, 40e-6, 0.2, State.at_rest(setup.model)))
+        if is_crowded:
+            crowd(setup.library(0.2))
+        neighbours = CarriedTangent(PiecewiseMotion(setup, 60e-6, 0.2, State.at_rest(setup.model)))
         ratios.append([neighbours.part(1) for _ in range(6)])
+        assert 7 not in setup.library(0.2).masks  # forgotten
     assert None not in ratios[0]
     assert ratios[0] == ratios[1]
 
@@ -140,8 +138,7 @@ def test_endless_events_are_left_to_collocation(monkeypatch, too_many):
     """More sets of contacts, or more events, than allowed: collocation takes the case, to the same answer."""
     exact = simulate(trial_rig(3), **CLOSE)
     if too_many == "sets":
-        monkeypatch.setattr(ModeLibrary, "_most_modes", 4)
-        monkeypatch.setattr(met_modes, "MOST_REFILLS", 1)
+        monkeypatch.setattr(table_stack, "MOST_MODES", 4)
     else:
         monkeypatch.setattr(event_driven_march, "advance", lambda *_: CONTACT_UNSOLVED)
     forget()

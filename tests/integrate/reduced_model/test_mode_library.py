@@ -1,7 +1,5 @@
 """Closed-form motion with contacts held closed, against the equations of motion and matrix exponentials."""
 
-import gc
-import weakref
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,13 +11,12 @@ from trial_rig import trial_rig
 
 from rubhpc.fem.assemble import assemble
 from rubhpc.integrate.reduced_model import mode_library
-from rubhpc.integrate.reduced_model.contact_mode import confine, solve_contact_mode
+from rubhpc.integrate.reduced_model.contact_mode import solve_contact_mode
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
-from rubhpc.integrate.reduced_model.mode_tables import bytes_ahead
 from rubhpc.integrate.reduced_model.reduction import directions, reduce_model
-from rubhpc.integrate.reduced_model.system_modes import solve_parts
 from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.contact_modes import (
+    LANES,
     LATERAL_RATE,
     LATERAL_ROW,
     N_ROTOR_ROW,
@@ -53,9 +50,7 @@ def case(request):
     reduced = reduce_model(model, spin, 1e-30)
     gap_jacobian, force_direction, _ = directions(reduced, model, FRICTION)
     opened = solve_contact_mode(reduced, gap_jacobian, force_direction, 0)
-    n = len(reduced.stiffness)
-    known = solve_parts(confine(reduced, np.zeros((0, n)), np.zeros((n, 0)))[2])
-    settings = {"known": known, "tick": TICK, "sample_level": SAMPLE_LEVEL, "n_level": N_LEVEL}
+    settings = {"tick": TICK, "sample_level": SAMPLE_LEVEL, "n_level": N_LEVEL}
     library = ModeLibrary(reduced, model, FRICTION, opened=opened, **settings)
     for mask in MASKS[1:]:
         assert library.add(mask)
@@ -293,50 +288,6 @@ def test_longest_step_within_a_count_of_ticks(count):
     assert 2**level <= count < 2 ** (level + 1)
 
 
-def test_large_modes_are_solved_once_for_both_tables(monkeypatch):
-    """What the tables hold that a motion is followed with those of its record take over, bit for bit."""
-    monkeypatch.setattr(mode_library, "MOST_BYTES", 2**20)
-    monkeypatch.setattr(mode_library, "FEW_PAIRS", 2)
-
-    def library():
-        setup = prepare(
-            trial_rig(3),
-            180.0,
-            contact=Contact(),
-            integrator=Integrator(),
-            samples_per_revolution=64,
-        )
-        return setup, setup.library(0.2)
-
-    setup, both = library()
-    _, alone = library()
-    for mask in (1, 3, 5):
-        assert both.followed.add(mask)
-        assert both.add(mask)
-        assert alone.add(mask)
-    assert setup.n_solved(0.2) == 3
-    for name, taken, solved in zip(both.tables()._fields, both.tables(), alone.tables(), strict=True):
-        assert taken.tobytes() == solved.tobytes(), name
-    assert both.tables().output.shape[2] < SAMPLES_AT_ONCE * (N_ROTOR_ROW + 9)
-    assert both.followed.tables().slip_re.shape[1] == 0
-
-
-def test_large_modes_are_freed_as_soon_as_they_are_forgotten(monkeypatch):
-    """Both tables, gigabytes of a ring of 32, without a search for objects that hold each other."""
-    monkeypatch.setattr(mode_library, "MOST_BYTES", 2**20)
-    setup = prepare(
-        trial_rig(3), 180.0, contact=Contact(), integrator=Integrator(), samples_per_revolution=64
-    )
-    held = [weakref.ref(setup.library(0.2)), weakref.ref(setup.library(0.2).followed)]
-    assert held[0]() is not held[1]()
-    gc.disable()
-    try:
-        setup.forget(0.2)
-        assert [library() for library in held] == [None, None]
-    finally:
-        gc.enable()
-
-
 def test_modes_that_were_given_up_are_counted_again():
     """A plan has to know what contact modes cost, not how many there are."""
     setup = prepare(
@@ -351,26 +302,28 @@ def test_modes_that_were_given_up_are_counted_again():
     assert setup.n_solved(0.2) == 3
 
 
-def test_more_room_keeps_no_motion_in_closed_form_for_longer(monkeypatch):
-    """Tables with which a motion is followed hold a third more modes than it is judged by."""
-    monkeypatch.setattr(mode_library, "MOST_BYTES", 2**20)
+def test_tables_of_many_pairs_hold_one_sample(monkeypatch):
+    """No step passes a sample then: those of several would be a third of the memory of a large ring."""
     monkeypatch.setattr(mode_library, "FEW_PAIRS", 2)
     setup = prepare(
         trial_rig(3), 180.0, contact=Contact(), integrator=Integrator(), samples_per_revolution=64
     )
-    both = setup.library(0.2)
-    n_byte = both.followed._tables.n_byte_of_one
-    assert both.followed.n_most == 2 * 2**20 // n_byte > 4
-    assert both.followed.n_usual == 3 * 2**19 // n_byte
-    assert both.n_usual == both.n_most
+    tables = setup.library(0.2).tables()
+    assert tables.output.shape[2] == -(-(N_ROTOR_ROW + 9) // LANES) * LANES
+    assert tables.power_re.shape[1] == setup.sample_level + 1
 
 
-def test_memory_with_more_samples_ahead_is_predicted(case):
-    """From tables of one sample, as those of a large ring, to those that the library holds."""
-    library, held = case.library, case.library._tables_of(case.library._opened, case.reduced)
-    more = library._n_ahead, library._n_level
-    library._n_ahead, library._n_level = 1, SAMPLE_LEVEL + 1
-    few = library._tables_of(library._opened, case.reduced)
-    library._n_ahead, library._n_level = more
-    sizes = [sum(field.nbytes for field in tables) for tables in (few, held)]
-    assert sizes[0] < sizes[1] == bytes_ahead(few, case.reduced, *more)
+def test_a_case_goes_on_with_tables_that_the_library_has_given_up():
+    setup = prepare(
+        trial_rig(3), 180.0, contact=Contact(), integrator=Integrator(), samples_per_revolution=64
+    )
+    library = setup.library(0.2)
+    for mask in (1, 2):
+        library.add(mask)
+    held = library.tables()
+    before = [field.copy() for field in held]
+    library.forget()
+    library.add(6)
+    assert library.masks == [0, 6]
+    for field, expected in zip(held, before, strict=True):
+        assert np.array_equal(field, expected)

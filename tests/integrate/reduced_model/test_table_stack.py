@@ -20,7 +20,7 @@ def tables(k: int) -> Tables:
 
 @pytest.mark.parametrize("n", [FIRST_ROOM, NEXT_ROOM, NEXT_ROOM + 3])
 def test_tables_stay_as_room_grows(n):
-    stack = TableStack(2, 40)
+    stack = TableStack(2)
     for k in range(n):
         stack.add(tables(k))
     assert [len(field) for field in stack.view()] == [n, n]
@@ -31,7 +31,7 @@ def test_tables_stay_as_room_grows(n):
 
 def test_large_tables_have_pages_of_their_own():
     """Which go back to the system when nobody has them any more; the C library would keep them."""
-    stack = TableStack(2, 40)
+    stack = TableStack(2)
     for k in range(NEXT_ROOM):
         stack.add(tables(k))
     base = stack.view().large

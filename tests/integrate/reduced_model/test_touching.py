@@ -1,4 +1,4 @@
-"""Contact modes and energies of what touches alone: those of the whole."""
+"""Contact modes of what touches alone: those of the whole."""
 
 import numpy as np
 import pytest
@@ -51,7 +51,7 @@ def test_what_touches_moves_alone(bodies, closed):
     seen = np.abs(pairs.gap_jacobian) + np.abs(pairs.force_direction)
     among = OpenBodies(reduced, solve_contact_mode(reduced, *pairs, 0), seen)
     mask = sum(1 << i for i in closed)
-    whole, own = (mode_among(of, reduced, pairs, mask, None) for of in (None, among))
+    whole, own = (mode_among(of, reduced, pairs, mask) for of in (None, among))
     touching = among.touching(closed)
     assert (touching is None) == (len(closed) == Q)
     if touching:
