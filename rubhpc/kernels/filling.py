@@ -52,17 +52,13 @@ class Speeds(Struct):
 
 
 @jit
-def fill(tables: ModeTables, place: int, course: ModeCourse, speeds: Speeds, first: int, last: int) -> None:
-    """Bring tables of a mode to the speeds from `first` up to `last`, in place.
-
-    Those of the mode at speed `j` are the tables `place + j`.
-    """
-    for j in range(first, last):
-        turning = complex(speeds.growth[j], speeds.spin[j])
-        if course.courses.kept.size > 0:
-            follow(tables, place + j, course.courses, speeds.within[j])
-            follow_rates(tables, place + j, course.exponent, course.is_pair.size)
-        fill_at(tables, place + j, course, turning, speeds.factor[j], speeds.tick[j], speeds.interval[j])
+def fill(tables: ModeTables, place: int, course: ModeCourse, speeds: Speeds, j: int) -> None:
+    """Bring the tables of a mode, `place` being their index, to the speed `j`, in place."""
+    turning = complex(speeds.growth[j], speeds.spin[j])
+    if course.courses.kept.size > 0:
+        follow(tables, place, course.courses, speeds.within[j])
+        follow_rates(tables, place, course.exponent, course.is_pair.size)
+    fill_at(tables, place, course, turning, speeds.factor[j], speeds.tick[j], speeds.interval[j])
 
 
 @linked

@@ -11,7 +11,7 @@ import numpy as np
 from rubhpc.fem.probes import probes_at, seen_at_rest
 from rubhpc.fem.statics import at_rest_under
 from rubhpc.integrate.changing_speed.mode_courses import between
-from rubhpc.integrate.changing_speed.range_library import AT_ONCE, RangeLibrary, TableBuffer
+from rubhpc.integrate.changing_speed.range_library import RangeLibrary, TableBuffer
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.reduced_model.flight_modes import FlightModes, motion_rows
 from rubhpc.integrate.reduced_model.reduction import reduced_sag
@@ -43,7 +43,6 @@ class HeldMatrices:
 
     template: PieceSetup  # set-up to copy for the speed of a piece
     is_balanced = True  # whether energies are requested
-    at_once = AT_ONCE  # pieces that are integrated together, at most
 
     def __init__(
         self,
@@ -160,7 +159,6 @@ class HeldMatrices:
                 beside=[reduced for _, reduced in self._beside],
                 at_place=self.at_place,
                 is_balanced=self.is_balanced,
-                at_once=self.at_once,
             )
         library = self._libraries[friction]
         library.tune(piece.speeds, piece.place)

@@ -9,7 +9,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from rubhpc.integrate.changing_speed.piece_setup import with_values
-from rubhpc.integrate.changing_speed.range_library import AT_ONCE, speeds_of
+from rubhpc.integrate.changing_speed.range_library import speeds_of
 from rubhpc.integrate.changing_speed.ripples import Ripples
 from rubhpc.integrate.changing_speed.speed_ranges import SpeedRanges
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     Ints = NDArray[np.int64]
 
 
-SAGGING_AT_ONCE = 8  # pieces taken together where their sag, one for all, follows the speed
+AT_ONCE, SAGGING_AT_ONCE = 16, 8  # pieces set up together; where their sag, one for all, follows the speed
 LEAST_GROWTH = 1e-5  # of the unbalance force in a piece
 MOST_HELD = 4  # matrices at hand, of a spin that swings between them
 MOST_BYTES = 3 * 2**29  # of contact modes that are kept, with their matrices, for other cases

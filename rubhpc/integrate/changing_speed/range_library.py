@@ -47,8 +47,6 @@ Complexes = NDArray[np.complex128]
 
 NOT_FILLED = -2  # in place of a set of closed pairs: a contact mode that this piece has not met
 STRUCK = 1e9  # rad/s, speed of the unbalance for which modes are solved
-AT_ONCE = 16  # pieces for whose speeds a contact mode is filled at once
-MOST_BYTES = 2**23  # of its tables for so many pieces; where they are more, it is filled for fewer at once
 
 
 def output_operators(reduced: ReducedModel) -> tuple[Floats, Floats, Floats]:
@@ -151,8 +149,6 @@ class RangeLibrary(ModeLibrary):
         Whether energies are asked for.
     buffers : dict, optional
         Tables of the libraries that take turns, by what they have in common.
-    at_once : int
-        Pieces for whose speeds a contact mode is filled at once, at most.
     """
 
     _n_ahead = 0  # outputs are filled in for each speed
@@ -172,12 +168,11 @@ class RangeLibrary(ModeLibrary):
         at_place: Callable[[float], ReducedModel] | None = None,
         is_balanced: bool = True,
         buffers: dict[tuple[object, ...], TableBuffer] | None = None,
-        at_once: int = AT_ONCE,
     ) -> None:
         """Start with every pair open."""
         self.reduced, self._reach = _struck(reduced, phasor), reach
         self._spin = reduced.spin
-        self._is_measured, self._at_place, self._at_once = is_balanced, at_place, at_once
+        self._is_measured, self._at_place = is_balanced, at_place
         self._take_pairs(model, friction)
         self._tick, self._sample_level, self._n_level = tick, sample_level, n_level
         self._phasor, self._output = phasor, np.hstack(output_operators(reduced))
@@ -196,15 +191,10 @@ class RangeLibrary(ModeLibrary):
         buffer = TableBuffer(TableStack(1 + len(self.gap_jacobian)))
         self._buffer = buffer if buffers is None else buffers.setdefault(kind, buffer)
         self._tables = self._buffer.tables
-        self.n_room = 0  # tables that each mode has, for as many pieces
-        # Of the modes in the buffer: the first of their tables, and up to which piece of those at hand they
-        # are filled.
-        self._place: dict[int, int] = {}
-        self._filled: dict[int, int] = {}
+        self._place: dict[int, int] = {}  # of the tables of each mode in the buffer
         at_middle = [self._spin], [complex(self._spin**2)], [0.0], [tick]
         self._speeds = speeds_of(*at_middle, self._spin, sample_level)
         self._at = 0  # piece among those at hand
-        self._window = 0  # the first of the pieces for which there are tables
         self.masks: list[int] = []
         self._take_buffer()
         self.add(0)
@@ -225,12 +215,7 @@ class RangeLibrary(ModeLibrary):
     @property
     def n_most(self) -> int:
         """Contact modes that there is room for."""
-        return self._tables.n_most // max(1, self.n_room)
-
-    @property
-    def window_end(self) -> int:
-        """The piece, of those at hand, from which on tables are filled anew."""
-        return self._window + self.n_room
+        return self._tables.n_most
 
     @property
     def is_full(self) -> bool:
@@ -241,10 +226,6 @@ class RangeLibrary(ModeLibrary):
         """Whether a mode follows the speed, in coordinates that go on from piece to piece."""
         return self._is_followed and mask not in self._strange
 
-    def has_strange(self, met: set[int]) -> bool:
-        """Whether one of the modes met cannot be followed, and is solved at each piece."""
-        return not self._strange.isdisjoint(met)
-
     def unmet(self, met: set[int]) -> list[int]:
         """None: each piece begins with no mode."""
         return []
@@ -252,34 +233,23 @@ class RangeLibrary(ModeLibrary):
     def tune(self, speeds: Speeds, piece: int) -> None:
         """Begin a piece, given by its place among the speeds: with no mode."""
         self._take_buffer()
-        if speeds is not self._speeds or piece <= self._at:
-            self._speeds, self._filled = speeds, {}
-        self.reach(piece)
-
-    def reach(self, piece: int) -> None:
-        """Go on to a later piece of those at hand, with no mode, though some may be filled already."""
-        self._at = piece
-        window = piece - piece % max(1, self.n_room)
-        if window != self._window:
-            self._window, self._filled = window, {}
+        self._speeds, self._at = speeds, piece
         self.masks = [NOT_FILLED] * len(self.masks)
         self.tables().mask[:] = NOT_FILLED
 
     def add(self, mask: int) -> bool:
-        """Fill tables of the mode with these pairs closed; returns whether they are wide enough for it."""
+        """Fill the tables of the mode with these pairs closed; returns whether they are wide enough."""
         if not self._has(mask):
             return False
         if mask not in self._place:
-            self._put(mask)
-        at, speeds = self._at, self._speeds
-        place = self._place[mask] + at - self._window
-        if self._filled.get(mask, 0) <= at:
-            end = min(speeds.spin.size, self.window_end)
+            self._place[mask] = len(self.masks)
+            self._tables.add(self._held[mask][0])
+            self.masks.append(NOT_FILLED)
+        place, at = self._place[mask], self._at
+        if self.masks[place] != mask:
             if mask in self._strange:
-                self._solve_at(mask, place, float(speeds.within[at]))
-                end = at + 1
-            fill(self.tables(), place - at, self._held[mask][1], speeds, at, end)
-            self._filled[mask] = end
+                self._solve_at(mask, place, float(self._speeds.within[at]))
+            fill(self.tables(), place, self._held[mask][1], self._speeds, at)
         self.masks[place] = self.tables().mask[place] = mask
         return True
 
@@ -290,15 +260,6 @@ class RangeLibrary(ModeLibrary):
         if not self._has(mask) or mask in self._strange:
             return None
         return Eigenmodes.of(*self._held[mask], within)
-
-    def filled(self, met: set[int]) -> Ints:
-        """Sets of closed pairs of the tables that are filled for this piece or later ones, of those met."""
-        found = np.full(len(self.masks), NOT_FILLED)
-        for mask, end in self._filled.items():
-            if mask in met:
-                first = self._place[mask] - self._window
-                found[first + self._at : first + end] = mask
-        return found
 
     def forget(self) -> None:
         """Make room: keep no mode but that with every pair open."""
@@ -315,24 +276,7 @@ class RangeLibrary(ModeLibrary):
             self._buffer.user = self
             self._tables.clear()
             self._place.clear()
-            self._filled.clear()
             self.masks = []
-
-    def _put(self, mask: int) -> None:
-        """Put a mode into the buffer."""
-        row, place = self._held[mask][0], len(self.masks)
-        self.n_room = self.n_room or self._n_room_of(sum(field.nbytes for field in row))
-        self._place[mask] = place
-        self._tables.add(row, self.n_room)
-        self.masks += [NOT_FILLED] * self.n_room
-        self.tables().mask[place:] = NOT_FILLED
-
-    def _n_room_of(self, n_byte: int) -> int:
-        """Pieces for which a mode is filled at once, a power of two, by the memory of its tables for one."""
-        found = self._at_once
-        while found > 1 and found * n_byte > MOST_BYTES:
-            found //= 2
-        return found
 
     def _has(self, mask: int) -> bool:
         """Whether it has the mode with these pairs closed; one met for the first time is solved."""

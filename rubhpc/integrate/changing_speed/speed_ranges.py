@@ -96,8 +96,6 @@ class SpeedRanges:
             model, reduced, self.phasor, self._momentum, *at, slowest.sample_level, buffers, beside
         )
         held.is_balanced = free is not None
-        if free is not None:
-            held.at_once = 1  # the speed after a piece follows from its energies
         if fastest.model.rotor.tabulated_speeds:
             held.sagging_models = [model, *(other for other, _ in others)]
         held.template = PieceSetup(

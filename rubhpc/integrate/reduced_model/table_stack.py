@@ -68,14 +68,14 @@ class TableStack:
         self._room: list[Any] = []
         self._view: Any = None
 
-    def add(self, row: Any, count: int = 1) -> None:
-        """Add the tables of a mode, a named tuple of (1, ...) each, `count` times."""
+    def add(self, row: Any) -> None:
+        """Add the tables of a mode, a named tuple of (1, ...) each."""
         rows: list[Any] = list(row)
-        first, end = self._n_filled, self._n_filled + count
+        first, end = self._n_filled, self._n_filled + 1
         if not self._room:
             n_bytes = sum(field.nbytes for field in rows)
             self.n_most = max(self._n_least, min(self.n_most, MOST_BYTES // n_bytes))
-            n_room = max(count, min(self._n_least, FIRST_ROOM))
+            n_room = min(self._n_least, FIRST_ROOM)
             self._room = [room_for((n_room, *field.shape[1:]), field.dtype) for field in rows]
             self._kind = type(row)
         elif end > len(self._room[0]):  # unwritten memory is not allocated by the system

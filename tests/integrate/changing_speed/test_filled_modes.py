@@ -70,10 +70,8 @@ def test_a_tuned_mode_is_the_mode_at_that_speed(q):
     columns = [170.0, spin], [0.5 + 0.3j, factor], [3.0, 0.0], [base.tick, tick]
     speeds = speeds_of(*columns, base.spin, base.sample_level, 40.0)
     library.tune(speeds, 0)
-    for mask in masks:  # the next speed is tuned with this one where there is room
+    for mask in masks:
         library.add(mask)
-    assert library.n_room > 1 or q > 1
-    assert (library.filled(set(masks)) >= 0).sum() == min(2, library.n_room) * len(masks)
     library.tune(speeds, 1)
     assert not any(mask >= 0 for mask in library.masks)  # they wait until they are met
     force = np.stack([(phasor * factor).real, -(phasor * factor).imag])
