@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 LIVE, DRAWS = 100, 1000
 # Of a hypothesis of which the evidence is asked: it has a quarter of the live points.
 FEWEST = 30  # of these: bounds around fewer hold few points that are accepted
-MOST_OF_OTHERS = 40  # evaluations a live point: one that fits badly has no end of small peaks
+MOST_OF_OTHERS = 80  # evaluations a live point: one that fits badly has no end of small peaks
 FIRST_LOOK = 8  # evaluations a live point of each, before those far from the best are left
 NEAR = 50.0  # of ln(evidence): about twice what likelier cases add after the first look
 POSTERIOR, CASES = "posterior.nc", "cases"
