@@ -72,17 +72,18 @@ def simulate(
         Coefficient of friction.
     overrides : dict, optional
         Single keys of the rig: `{"stator.youngs_modulus": "30 GPa"}`.
-    law : {"lagrange", "penalty"}
-        Gaps closed exactly, or by a spring and a damper.
-    stiffness : float (N/m) or str with a unit, optional
-        Stiffness of the penalty's spring; required with `law="penalty"`.
-    damping : float (N s/m) or str with a unit, optional
-        Damping of the penalty; none by default.
+    law : {"lagrange", "penalty", "hertz"}
+        Contact law: multipliers that close gaps exactly (by default), a spring and a damper, or Hertz's law
+        with Hunt and Crossley's damping.
+    stiffness : float (N/m; N/m^1.5) or str with a unit, optional
+        Stiffness of the penalty's spring, or in N/m^1.5 of Hertz's law, each of which needs it.
+    damping : float (N s/m; s/m) or str with a unit, optional
+        Damping of the penalty, or in s/m of Hertz's law; none by default.
     restitution : float, optional
-        Normal velocity after an impact over that before it, 0 to 1; default none.
+        Normal velocity after an impact over that before it, 0 to 1, with `law="lagrange"`; default none.
     friction_law : {"sliding", "coulomb", "stribeck", "table"}
-        Steady sliding (by default); or set-valued with stick: Coulomb's law, Stribeck's, or a table over the
-        slip speed.
+        Friction law: steady sliding in the sense of the spin; or, with stick, Coulomb's law (by default),
+        Stribeck's, or a table over the slip speed.
     static_friction_ratio : float, optional
         Coefficient of friction at rest over that in sliding, 1 or more; of Coulomb's law by default 1.
     stribeck_speed : float (m/s) or str with a unit, optional
@@ -92,10 +93,10 @@ def simulate(
     friction_ratio : sequence of float, optional
         Coefficient at these slip speeds over `friction`; linear between them, constant beyond.
     normal : {"fixed", "updated"}
-        Contact normal along the stator's axis (by default), or along the line of centres.
+        Contact normal along the stator's axis, or along the line of centres (by default).
     model : {"mokhtar2017"}, optional
         A published model: the fixed normal, sliding friction, and linear geometry of the stators that give
-        none.
+        none. Without a model these have second-order geometry.
     method : {"modal", "central-difference"}
         Integrator: the exact modal one, or the paper's.
     step : float (s) or str, optional
@@ -121,7 +122,7 @@ def simulate(
         What the record contains in addition to its measures and its final state.
     lyapunov : int
         Lyapunov exponents measured by the exact tangent map over 256 revolutions after the record:
-        `lyapunov_1` and on, and `kaplan_yorke_dimension`; NaN where the laws have no closed form.
+        `lyapunov_1` and on, and `kaplan_yorke_dimension`; NaN by the central difference.
     probes : sequence of Probe or dict
         Additional sensors, by the keys of [[record.probe]], such as `{"name": "left", "node": 1, "angle":
         "-45 deg"}`: the record holds `probe_left` and `spectrum_probe_left`.

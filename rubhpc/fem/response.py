@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from rubhpc.fem.model import Body, Model
 
 PHASES = 3600  # of a revolution, at which an orbit in a bore is looked at: 4e-7 of its amplitude
+_STIFFER = 1.001  # of the frequency of rigid-body modes on a softness, above which a mode is another one
 
 
 def steady_response(model: Model, spin: float) -> NDArray[np.complex128]:
@@ -162,7 +163,8 @@ def contact_free_reach(model: Model, spin: float) -> float:
 def first_lateral_frequency(model: Model) -> float:
     """Return the lowest undamped lateral natural frequency of the rotor at standstill, rad/s.
 
-    It is the speed at which `speed_ratio` is 1. Rigid-body modes, of frequency 0, do not count.
+    It is the speed at which `speed_ratio` is 1. Rigid-body modes do not count: their frequency is 0, or that
+    of the softness of a rotor that nothing but bores holds (`statics.caught`).
     Speed-dependent bearings have their coefficients at standstill, or at the lowest speed of their table.
     """
     undamped = replace(model.rotor.at(0.0), damping=np.zeros_like(model.rotor.damping), by_speed=None)
@@ -173,9 +175,10 @@ def first_lateral_frequency(model: Model) -> float:
         found = np.sqrt(undamped_modes(undamped.mass[np.ix_(rows, rows)], stiffness)[0])
     else:
         found = 2 * math.pi * np.array([m.frequency for m in modes(undamped) if m.kind == "lateral"])
-    if not (found > 0.0).any():
+    found = found[found > _STIFFER * math.sqrt(model.rotor.softness)]
+    if not found.size:
         raise InputError("speed_ratio: the rotor has no lateral natural frequency; give the speed instead")
-    return float(found[found > 0.0].min())
+    return float(found.min())
 
 
 def step_limit(model: Model) -> float:

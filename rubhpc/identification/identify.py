@@ -30,23 +30,25 @@ from rubhpc.streams import lasting_streams
 from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from os import PathLike
 
     import numpy as np
     import xarray as xr
     from numpy.typing import NDArray
 
-    from rubhpc.identification.candidates import NoRub
+    from rubhpc.identification.candidates import Hypothesis, NoRub
     from rubhpc.identification.nested import Sampled
     from rubhpc.identification.problem import Problem
 
     Floats = NDArray[np.float64]
 
 LIVE, DRAWS = 100, 1000
-# Of a hypothesis of which the evidence is asked: it has half the live points.
+# Of a hypothesis of which the evidence is asked: it has a quarter of the live points.
 FEWEST = 30  # of these: bounds around fewer hold few points that are accepted
-MOST_OF_OTHERS = 40  # evaluations a live point: one that fits badly has no end of small peaks
+MOST_OF_OTHERS = 80  # evaluations a live point: one that fits badly has no end of small peaks
+FIRST_LOOK = 8  # evaluations a live point of each, before those far from the best are left
+NEAR = 50.0  # of ln(evidence): about twice what likelier cases add after the first look
 POSTERIOR, CASES = "posterior.nc", "cases"
 
 
@@ -188,12 +190,15 @@ def _identify(
     sampled = simulate(problem.rub, live, MOST)
     evaluator().evaluated.read()  # those of other ranks
     outcomes = [evaluator().outcome(values) for values in sampled.values]
-    others = {
-        other: simulate(other, max(live // 2, FEWEST), MOST_OF_OTHERS)
-        if isinstance(other, Rub)
-        else _sample_alone(other, live, seed)
-        for other in problem.others
+    others: dict[Hypothesis, Sampled] = {
+        one: _sample_alone(one, live, seed) for one in problem.others if not isinstance(one, Rub)
     }
+    few = max(live // 4, FEWEST)
+    others |= of_contenders(
+        lambda rub, most: simulate(rub, few, most),
+        [one for one in problem.others if isinstance(one, Rub)],
+        max(one.log_evidence for one in (sampled, *others.values())),
+    )
     found = Found(problem=problem, rub=sampled, others=others, outcomes=outcomes)
     tree = tree_of(found, draws, seed)
     if folder is not None:
@@ -202,6 +207,33 @@ def _identify(
             path.unlink(missing_ok=True)
             tree.to_netcdf(path, engine="h5netcdf")
     return Identification(tree=tree, lines=tuple(in_words(found, tree)))
+
+
+def of_contenders(
+    look: Callable[[Rub, int], Sampled], hypotheses: Sequence[Rub], best: float
+) -> dict[Hypothesis, Sampled]:
+    """Sample hypotheses, those that fit far worse than the best for a first look only.
+
+    The likeliest case of a hypothesis bounds its evidence.
+
+    Parameters
+    ----------
+    look : callable
+        Samples a hypothesis with so many evaluations a live point; cases that are known are not repeated.
+    hypotheses : sequence of Rub
+    best : float
+        Logarithm of the best evidence of what has been sampled before.
+    """
+    found: dict[Hypothesis, Sampled] = {one: look(one, FIRST_LOOK) for one in hypotheses}
+
+    def likeliest(one: Rub) -> float:
+        return float(found[one].log_likelihoods.max())
+
+    for one in sorted(hypotheses, key=likeliest, reverse=True):
+        best = max(best, *(sampled.log_evidence for sampled in found.values()))
+        if likeliest(one) > best - NEAR and not found[one].is_whole:
+            found[one] = look(one, MOST_OF_OTHERS)
+    return found
 
 
 def _sample_alone(other: NoRub, live: int, seed: int) -> Sampled:

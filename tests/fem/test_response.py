@@ -20,7 +20,7 @@ from rubhpc.fem.response import (
 from rubhpc.rig.parts import Bearing, Damping, Disc, ShaftSection
 from rubhpc.rig.rig import Rig
 from rubhpc.rig.rotors import Load, Rotor, Unbalance
-from rubhpc.rig.stators import LumpedStator
+from rubhpc.rig.stators import Bore, LumpedStator
 
 # all but rigid and massless: a mass on two bearings
 RIGID = ShaftSection(
@@ -157,6 +157,16 @@ def test_speed_reference_is_the_lowest_lateral_mode_and_no_other():
     model = assemble(replace(rig, rotor=replace(rig.rotor, shaft=(soft,))))
     assert next(mode.kind for mode in modes(model.rotor)) == "torsional"
     assert first_lateral_frequency(model) / (2 * math.pi) == pytest.approx(31.56, abs=0.05)
+
+
+def test_speed_reference_is_no_rigid_body_mode_in_a_bore():
+    rig = read_rig("mokhtar2017")
+    hinged = replace(rig.rotor, bearing=(rig.rotor.bearing[0], replace(rig.rotor.bearing[1], stiffness=0.0)))
+    bore = Bore(node=15, rigid=True, radius=0.01)
+    model = assemble(replace(rig, rotor=hinged, stator=(bore,)))
+    free = [mode.frequency for mode in modes(model.rotor) if mode.kind == "lateral"]
+    assert free[:2] == pytest.approx([math.sqrt(model.rotor.softness) / (2 * math.pi)] * 2)
+    assert first_lateral_frequency(model) / (2 * math.pi) == pytest.approx(free[2])
 
 
 def test_speed_reference_leaves_out_damping_and_takes_the_softer_plane():

@@ -13,6 +13,8 @@ import rubhpc
 from rubhpc.commands.identify import identify
 from rubhpc.errors import InputError
 from rubhpc.identification import evaluation
+from rubhpc.identification.identify import FIRST_LOOK, MOST_OF_OTHERS, of_contenders
+from rubhpc.identification.nested import Sampled
 from rubhpc.identification.problem import read_problem
 from rubhpc.identification.words import _verdict
 
@@ -242,6 +244,34 @@ def test_a_speed_that_is_known_roughly_is_refined(tmp_path):
     assert problem.channels.spin == pytest.approx(rubbing_machine.SPIN, rel=2e-5)  # a thousandth of a bin
     assert "repeats" in problem.comparison.about
     assert problem.channels.angle_error == np.inf
+
+
+def test_only_contenders_are_sampled_to_the_end():
+    ends = {
+        "far": 100.0,
+        "best": 300.0,
+        "near": 260.0,
+        "whole": 299.0,
+    }  # ln(likelihood)
+    looks = []
+
+    def look(name, most):
+        looks.append((name, most))
+        likeliest = ends[name] - (20.0 if most == FIRST_LOOK else 0.0)
+        only = np.zeros((1, 1)), np.zeros(1), np.zeros(1), np.array([likeliest])
+        is_whole = name == "whole" or most == MOST_OF_OTHERS
+        return Sampled(*only, log_evidence=likeliest - 8.0, error=1.0, n_call=1, is_whole=is_whole)
+
+    found = of_contenders(look, list(ends), 150.0)
+    assert list(found) == list(ends)
+    assert looks[len(ends) :] == [("best", MOST_OF_OTHERS)]
+    assert found["best"].log_evidence == 292.0
+    looks.clear()
+    of_contenders(look, ["far", "near"], 150.0)
+    assert looks[2:] == [("near", MOST_OF_OTHERS)]
+    looks.clear()
+    of_contenders(look, ["far", "near"], 300.0)
+    assert len(looks) == 2
 
 
 def test_ties_among_other_faults_are_said():

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rubhpc import Bore, InputError, read_rig, run_up, simulate
+from rubhpc import Bore, InputError, assemble, read_rig, run_up, simulate
+from rubhpc.fem.response import contact_free_amplitude
 from rubhpc.integrate.modal_setup import Release
 from rubhpc.rig.reading import rig_from_dict, with_keys
 
@@ -136,3 +137,21 @@ def test_a_seal_with_a_table_may_stay():
     law = {"start": "3000 rpm", "stop": "2999.9999 rpm", "time": "0.06001 s"}
     slow = run_up(rig_from_dict(table), **law, **case)
     assert slow.vertical.values == pytest.approx(constant.vertical, abs=1e-3 * CLEARANCE)
+
+
+def test_a_bore_alone_holds_an_end_without_weight():
+    """A journal that stays on the wall of a small bore moves the shaft as a stiff bearing there does."""
+    hinge, loose = PACKAGED.rotor.bearing
+    rotor = replace(PACKAGED.rotor, bearing=(hinge, replace(loose, stiffness=0.0)))
+    rig = replace(PACKAGED, rotor=rotor, stator=(Bore(node=15, rigid=True, radius=0.01),))
+    probe = {"name": "disc", "node": 8, "angle": 0.0}
+    case = {"speed": 150.0, "friction": 0.0, "transient": 20, "revolutions": 2}
+    record = simulate(rig, clearance="20 nm", probes=[probe], **case)
+    assert record.contact_force[0].min() > 0.0
+    held = assemble(rig).rotor
+    stiffness = held.stiffness.copy()
+    for name in ("v", "w"):
+        stiffness[held.index(15, name), held.index(15, name)] += 1e12
+    stiff = replace(assemble(PACKAGED), rotor=replace(held, stiffness=stiffness))
+    known = contact_free_amplitude(stiff, 150.0)
+    assert record.to_dataset()["probe_disc"].values.max() == pytest.approx(known, rel=1e-3)

@@ -267,8 +267,9 @@ class FlightModes:
         turn = 2.0 * math.pi / abs(setup.spin)
         longest = math.floor(math.log2(turn / setup.tick)) - LONGEST_LEVEL
         first = max(SHORTEST_LEVEL, longest - MOST_SLOTS + 1)
-        if setup.model.rotor.softness:  # it rests metres away: shorter steps see the rounding of that
-            least = math.sqrt(np.finfo(float).eps * float(np.abs(setup.model.sag).max()) / QUIET)
+        sag = float(np.abs(setup.model.sag).max(initial=0.0))
+        if setup.model.rotor.softness and sag:  # it rests metres away: shorter steps see the rounding of that
+            least = math.sqrt(np.finfo(float).eps * sag / QUIET)
             first = min(max(first, math.ceil(math.log2(least / setup.tick))), longest)
         longest += self._n_longer
         k, n_y, n_x = longest - first + 1, (2 * s - 1) * n_row, self.motion.shape[1]
