@@ -255,6 +255,7 @@ def _integrate(case: Case, initial: State) -> Record:
         marched = march_record(march, setup, 0 if is_short else recording.revolutions)
     else:
         if isinstance(setup, ModalSetup) and setup.release is not None:
+            motion = None  # it is left where bearings let go
             through = record_through(march, setup, recording.revolutions, case.march)
             marched, march, n_step = through.marched, through.march, n_step + through.n_step
         else:

@@ -39,9 +39,7 @@ MOST_ITERATIONS, LEAST_STEP = 10, 1 / 4  # of Newton's method
 SHARE = 0.5  # of what the linear theory takes from its distance: the most that it strays from that
 LINEAR = 0.1  # of its distance, by which it may stray from the theory from one look to the next
 LOST = 3 / 4  # of what the linear theory takes from its distance, that it loses at least
-FALLEN = (
-    1 / 4
-)  # of the square of its distance where it begins to obey the theory: what is left of it in the end
+FALLEN = 1 / 4  # of the square of its distance, to which that falls while the case obeys the theory
 STRAYS = 0.3  # of its distance a period before: a case that strays less may follow the linear theory
 LEFT = 1.0  # of that distance: a case that strays more knows nothing of the motion
 THERE = 1e-8  # of the motion's size: a case as near as that has arrived

@@ -72,10 +72,8 @@ class TransientCase:
             self.n_revolution, left = self.n_revolution + now, left - now
             if reason is not None:
                 return reason
-            self.passed, self.states = (
-                np.concatenate([self.passed, sections])[-KEPT - 1 :],
-                self.march.pair_states,
-            )
+            self.passed = np.concatenate([self.passed, sections])[-KEPT - 1 :]
+            self.states = self.march.pair_states
         return None
 
     def continue_at(self, setup: ModalSetup, place: Place) -> None:
