@@ -49,16 +49,15 @@ def test_columns_are_those_of_the_monodromy_of_each_revolution(rig, law):
     motion = motion_of(rig, SPEED, 5, law)
     columns = np.cos(np.outer(np.arange(2.0 * motion.n), [1.0, 2.0, 3.0]))
     motion.stand_at(motion.start, motion.states)
-    found = [motion.go_on(columns) for _ in range(1)]
+    found = [motion.go_on(columns)]
+    for _ in range(1, N_REVOLUTION):
+        found.append(motion.go_on(found[-1]))
     revolutions = motion.follow(motion.start, motion.states, N_REVOLUTION)
     assert sum(len(one.pieces) - 1 for one in revolutions) > 2 * N_REVOLUTION
     known = columns
-    for k, revolution in enumerate(revolutions):
+    for moved, revolution in zip(found, revolutions, strict=True):
         known = motion.monodromy([revolution]) @ known
-        if k > 0:
-            found.append(motion.go_on(found[-1]))
-        off = motion.size(found[k][:, 0] - known[:, 0])
-        assert off < 1e-9 * motion.size(known[:, 0])
+        assert motion.size(moved[:, 0] - known[:, 0]) < 1e-9 * motion.size(known[:, 0])
     motion.stand_at(motion.start, motion.states)
     assert motion.go_on(columns, N_REVOLUTION) == pytest.approx(known, rel=1e-6, abs=1e-6 * abs(known).max())
 
