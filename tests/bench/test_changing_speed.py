@@ -2,14 +2,13 @@
 
 import math
 import time
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from closed_form import Contact, read_rig
-from overhung_pump import SEGMENT, pump
+from overhung_pump import pump
+from rings import in_ring
 
-from rubhpc import LumpedStator
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.changing_speed.case import record_run_up
 from rubhpc.integrate.setup import prepare
@@ -66,8 +65,7 @@ def test_a_run_up_over_constant_speed(seconds, capsys):
 @on_one_thread
 def test_an_overhung_pump_in_a_ring(count, capsys):
     """Gyroscopic terms matter: matrices are held over few ranges of speed, each with sets of contacts."""
-    tips = [LumpedStator(node=6, angle=0.2 + i * 2.0 * math.pi / count, **SEGMENT) for i in range(count)]
-    rig = replace(pump(), stator=tuple(tips))
+    rig = in_ring(pump(), count, first=0.2)
     speed_law = SpeedLaw(time=(0.0, 8.0), speed=(300.0, 360.0))
     recording = Recording(transient=0, revolutions=speed_law.n_revolution, samples_per_revolution=SAMPLES)
     case = CASE | {"clearance": 1.5e-4, "friction": 0.05}

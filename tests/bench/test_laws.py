@@ -2,11 +2,11 @@
 
 import math
 import time
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from closed_form import Contact, read_rig
+from rings import in_ring
 
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.compilation import seconds_compiling
@@ -45,11 +45,6 @@ ROWS = [  # rig, friction, cases (speed ratio, clearance), law, the ratio asked 
 ]
 
 
-def ring(count):
-    stator = ONE.stator[0]
-    return replace(ONE, stator=tuple(replace(stator, angle=2 * math.pi * i / count) for i in range(count)))
-
-
 @on_one_thread  # as every study is run; of two, one would wait at full speed
 def seconds_of(rig, cases, friction, law, first=FIRST):
     """Processor time of a case of 93 revolutions, s, mean of `cases`; set-up and contact modes are shared.
@@ -81,17 +76,17 @@ def test_laws_take_little_more_than_steady_sliding(capsys):
     sliding, lines, ratios = {}, [], []
     for name, count, friction, cases, law_name, law, asked in ROWS:
         for compiled in (law, {}):
-            seconds_of(ring(count), cases[:1], friction, compiled)  # compiles
+            seconds_of(in_ring(ONE, count), cases[:1], friction, compiled)  # compiles
         if name not in sliding:
-            sliding[name] = seconds_of(ring(count), cases, friction, {})
+            sliding[name] = seconds_of(in_ring(ONE, count), cases, friction, {})
             lines.append(f"{name:22} {'steady sliding':26} {1e3 * sliding[name]:8.1f} ms")
-        took = seconds_of(ring(count), cases, friction, law)
+        took = seconds_of(in_ring(ONE, count), cases, friction, law)
         ratios.append((took / sliding[name], asked))
         lines.append(
             f"{name:22} {law_name:26} {1e3 * took:8.1f} ms  ratio {ratios[-1][0]:.2f} of {asked:.0f}"
         )
     # A whip begins late: its contact modes are those of a whole case. The first round compiles.
-    whip = min(seconds_of(ring(3), [(0.98, 20e-6)], 0.3, COULOMB, RECORDING) for _ in range(3))
+    whip = min(seconds_of(in_ring(ONE, 3), [(0.98, 20e-6)], 0.3, COULOMB, RECORDING) for _ in range(3))
     lines.append(f"{'three stators, whip':22} {'Coulomb':26} {1e3 * whip:8.1f} ms")
     with capsys.disabled():
         print("\n" + "\n".join(lines))

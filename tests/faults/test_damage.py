@@ -60,12 +60,6 @@ def test_one_case_of_a_chunk_is_changed(store, finished):
     assert repaired_by_run(store, finished) == 1
 
 
-def test_a_chunk_is_deleted(store, finished):
-    Store(store).chunk_files((1, 0, 0))[4].unlink()
-    assert named_by_verify(store) == {(1, 0, 0), (1, 0, 1)}
-    assert repaired_by_run(store, finished) == 2
-
-
 def test_links_that_lead_back_to_themselves(store, finished):
     """In place of a chunk, of the chunks of some cases, and of a journal."""
     chunk, other = Store(store).chunk_files((1, 0, 0))[4], store / "vertical" / "c" / "0"

@@ -19,7 +19,7 @@ from running import (
     write_slow_study,
 )
 
-from rubhpc.schema import DONE, MISSING
+from rubhpc.schema import MISSING
 from rubhpc.storage.store import Store
 from rubhpc.storage.verify import verify
 
@@ -108,33 +108,3 @@ def test_a_rank_ends_with_its_launcher(tmp_path, launcher, moment, ranks):
     job.kill()
     job.communicate()
     seconds_until_gone(store)
-
-
-@pytest.mark.long
-@pytest.mark.timeout(3600)
-def test_a_growth_that_is_killed_in_earnest_loses_nothing(tmp_path):
-    """Values come in between on every axis; the run is killed while it begins, again and again."""
-    store = tmp_path / "tiny.zarr"
-    first = write_slow_study(tmp_path, "first.toml", friction=[0.1, 0.3, 0.5])
-    assert run(first).returncode == 0
-    friction = [0.5, 0.2, 0.3, 0.4, 0.1]
-    grown = write_slow_study(tmp_path, "grown.toml", friction=friction, speed_ratio=[2.0, 1.5, 0.9])
-    moments = random.Random(7)
-    for _ in range(20):
-        job = start(grown)
-        while job.poll() is None and not (store / ".rubhpc" / "lock").exists():
-            time.sleep(0.005)
-        time.sleep(moments.uniform(0, 0.5))
-        job.kill()
-        job.communicate()
-        assert not verify(store).cases
-        assert (Store(store).replay().status == DONE).sum() >= 12
-    done = run(grown, ranks=RANKS)
-    assert done.returncode == 0, done.stderr
-    whole = write_slow_study(
-        tmp_path, "whole.toml", friction=friction, speed_ratio=[2.0, 1.5, 0.9], output=tmp_path / "whole.zarr"
-    )
-    assert run(whole).returncode == 0
-    grown_bytes, whole_bytes = stored_bytes(store), stored_bytes(tmp_path / "whole.zarr")
-    assert {name for name in whole_bytes if grown_bytes.get(name) != whole_bytes[name]} == set()
-    print("\n20 kills of a run that grows its store: every one of its 12 cases stayed, bytes equal")

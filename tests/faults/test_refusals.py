@@ -7,7 +7,6 @@ import os
 import resource
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -16,7 +15,6 @@ from running import (
     complaint,
     each_launcher,
     environment,
-    journalled_cases,
     run,
     start,
     write_slow_study,
@@ -75,18 +73,6 @@ def test_a_second_run_on_a_store_is_refused_and_status_shows_of_the_first(tmp_pa
     first.send_signal(signal.SIGTERM)
     first.communicate(timeout=20)
     assert first.returncode == 75
-
-
-def test_the_lock_of_a_killed_run_is_no_hindrance(tmp_path):
-    study, store = write_slow_study(tmp_path), tmp_path / "tiny.zarr"
-    first = start(study)
-    while journalled_cases(store) == 0:
-        time.sleep(0.02)
-    first.kill()
-    first.communicate()
-    assert (store / ".rubhpc" / "lock").exists()
-    assert run(study).returncode == 0
-    assert not (store / ".rubhpc" / "lock").exists()
 
 
 def bound_by_permissions(*arguments: object) -> subprocess.CompletedProcess[str]:
@@ -152,15 +138,3 @@ def test_a_full_disk_is_reported_in_a_line_and_the_run_goes_on_once_there_is_spa
     assert not verify(store)
     n_kept = int(done.stdout.split("/12 cases are stored")[0])
     assert 0 < n_kept < 12
-
-
-def test_malformed_studies_write_nothing(tmp_path):
-    study = write_study(tmp_path, transient='"many"')
-    for ranks in (0, 2):
-        done = run(study, ranks=ranks)
-        assert done.returncode == 2
-        assert "tiny.toml" in done.stderr
-        assert "transient" in done.stderr
-        assert "Traceback" not in done.stderr
-    assert [path.name for path in tmp_path.iterdir()] == ["tiny.toml"]
-    assert sys.executable in command(study)[0]

@@ -17,6 +17,7 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
 from overhung_pump import SEGMENT, pump
+from rings import in_ring
 from trial_rig import STEEL, trial_rig
 
 import rubhpc
@@ -134,12 +135,6 @@ def _lone(radius: float = 0.05, **wall: Any) -> Rig:
     )  # fmt: skip
 
 
-def _pump_ring(count: int) -> Rig:
-    rig = pump()
-    stators = tuple(LumpedStator(node=6, angle=2 * np.pi * i / count, **SEGMENT) for i in range(count))
-    return replace(rig, stator=stators)
-
-
 _MACHINES: dict[str, Callable[[], Rig]] = {
     "packaged": _packaged,
     "stiff": lambda: _packaged(30e9),
@@ -155,7 +150,7 @@ _MACHINES: dict[str, Callable[[], Rig]] = {
     "lone, soft": lambda: _lone(mass=0.1, stiffness=1e6, damping=5.0, lateral_stiffness=2e5),
     "lone, slow rim": lambda: _lone(radius=0.004),
     "pump": pump,
-    "pump in 8": lambda: _pump_ring(8),
+    "pump in 8": lambda: in_ring(pump(), 8),
 }
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 from closed_form import read_rig, simulate
+from rings import in_ring
 from trial_rig import trial_rig
 
 from rubhpc import LumpedStator
@@ -26,17 +27,12 @@ ACCURACY = 1e-5  # of what is computed by collocation
 FEW = {"transient": 10, "revolutions": 6, "samples_per_revolution": 64, "keep": ()}
 
 
-def ring(count):
-    stator = STIFF.stator[0]
-    return replace(STIFF, stator=tuple(replace(stator, angle=2 * math.pi * i / count) for i in range(count)))
-
-
 @pytest.mark.parametrize("law", LAWS, ids=str)
 @pytest.mark.parametrize(
     ("rig", "case"),
     [
         (STIFF, {"speed_ratio": 1.5, "clearance": "40 um", "friction": 0.5}),  # irregular
-        (ring(3), {"speed_ratio": 0.75, "clearance": "60 um", "friction": 0.15}),
+        (in_ring(STIFF, 3), {"speed_ratio": 0.75, "clearance": "60 um", "friction": 0.15}),
         (trial_rig(3, cross=5e4), {"speed": 240.0, "clearance": "60 um", "friction": 0.3}),
     ],
     ids=["one", "three", "cross-coupled"],
@@ -52,7 +48,7 @@ def test_energy_balances_under_every_law(rig, case, law):
 def test_energy_balances_where_a_ring_bounces_thousands_of_times_a_revolution():
     """Light stators all around a rotor that turns within 10 um of them: their bounces end by themselves."""
     bouncing = LumpedStator(node=8, mass=0.1, stiffness=1e5, damping=5.0, radius=0.06)
-    rig = replace(STIFF, stator=tuple(replace(bouncing, angle=2 * math.pi * i / 8) for i in range(8)))
+    rig = in_ring(replace(STIFF, stator=(bouncing,)), 8)
     case = {"speed_ratio": 1.2, "clearance": "10 um", "friction": 0.1, "restitution": 0.8}
     record = simulate(rig, **case, **COULOMB, **FEW | {"transient": 1, "revolutions": 2})
     assert record.measures["left_closed_form"] == 0
@@ -62,11 +58,11 @@ def test_energy_balances_where_a_ring_bounces_thousands_of_times_a_revolution():
 @pytest.mark.parametrize("law", [{}, COULOMB, {"normal": "updated"}], ids=str)
 def test_masses_that_throw_each_other_open_come_to_rest(law):
     """In a ring with a clearance of 0.5 um; bounces within the tolerance of gaps would be 92 000 contacts."""
-    masses = (
-        LumpedStator(node=3, radius=0.03, mass=1.7, stiffness=1e6, angle=0.3 + 0.25 * math.pi * i)
-        for i in range(8)
+    mass = LumpedStator(node=3, radius=0.03, mass=1.7, stiffness=1e6)
+    rig, case = (
+        in_ring(replace(trial_rig(1), stator=(mass,)), 8, first=0.3),
+        {"speed": 45.0, "clearance": "0.5 um"},
     )
-    rig, case = replace(trial_rig(1), stator=tuple(masses)), {"speed": 45.0, "clearance": "0.5 um"}
     record = simulate(rig, **case, friction=0.2, **law, **FEW | {"transient": 0, "revolutions": 1})
     assert 50.0 < record.contacts_per_revolution.sum() < 1000.0
     assert record.energy_residual < 5e-7
@@ -84,9 +80,8 @@ def test_gaps_close_where_bodies_touch(kind, law):
         initial = {"from": "rest", "vertical": height, "vertical_velocity": -0.28}
         case = {"speed": 5.0, "clearance": "31 um", "friction": 0.52, "initial": initial}
     else:
-        angles = (5.086 + 2.0 * math.pi * i / 12 for i in range(12))
-        masses = (LumpedStator(node=3, mass=0.111, stiffness=7.76e6, angle=angle) for angle in angles)
-        rig = replace(trial_rig(1), stator=tuple(masses))
+        mass = LumpedStator(node=3, mass=0.111, stiffness=7.76e6)
+        rig = in_ring(replace(trial_rig(1), stator=(mass,)), 12, first=5.086)
         case = {"speed": 49.5, "clearance": "0.88 um", "friction": 0.256}
     record = simulate(rig, **case, **law, **FEW | {"transient": 0, "revolutions": 1}, accuracy=ACCURACY)
     assert record.contacts_per_revolution.sum() > 100.0

@@ -1,19 +1,14 @@
 """Periodic motions of the packaged rig: found, recorded, stable or not."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from closed_form import branch, periodic, read_rig, simulate
+from closed_form import branch, periodic, simulate
 
-from rubhpc import LumpedStator, NoPeriodicMotion, RubError
+from rubhpc import NoPeriodicMotion, RubError
 from rubhpc.errors import InputError
 from rubhpc.schema import REGIME
 
 BITES = {"speed_ratio": 0.75, "clearance": "100 um"}
-SPRINGS = LumpedStator(node=8, radius=0.06, count=8, mass=1e-3, damping=2.0, stiffness=1e5)
-RING = replace(read_rig("mokhtar2017"), stator=(SPRINGS,))
-JUMP = {"clearance": 3e-4, "friction": 0.0, "keep": ()}
 
 
 def test_solution_is_what_a_long_simulation_settles_on():
@@ -87,37 +82,6 @@ def test_records_of_a_branch_end_where_they_start():
     for i, point in enumerate(found.points):
         assert point.state.contact_force.any()
         assert_ends_where_it_starts(point.state, found.record(i))
-
-
-def test_motion_beside_it_draws_near_by_the_largest_multiplier():
-    """From beside the solution along its first direction, over a few periods."""
-    case = {"speed_ratio": 1.32, "keep": ()} | JUMP
-    rub = periodic(RING, **case, initial=followed(RING, 1.32).state)
-    growth = rub.multipliers[0]
-    assert abs(growth.imag) < 1e-12
-    assert rub.is_stable
-    later = [
-        simulate(RING, **case, initial=nudged(rub.state, 1e-2), transient=k, revolutions=1).final
-        for k in (31, 39)
-    ]
-    distance = [np.abs(state.velocity - rub.state.velocity).max() for state in later]
-    assert (distance[1] / distance[0]) ** (1 / 8) == pytest.approx(growth.real, rel=1e-3)
-
-
-def followed(rig, last):
-    """The rub followed up in speed."""
-    motion = None
-    for ratio in np.arange(1.17, last + 1e-9, 0.03):
-        motion = periodic(rig, speed_ratio=ratio, initial=motion and motion.state, **JUMP)
-    return motion
-
-
-def nudged(state, share):
-    return replace(
-        state,
-        rotor_velocity=state.rotor_velocity * (1 + share),
-        stator_velocity=tuple(v * (1 + share) for v in state.stator_velocity),
-    )
 
 
 def test_motion_without_contact_is_the_steady_response():

@@ -1,12 +1,12 @@
 """Probes at nodes of other machines show what the full model does: answers to forces, and motions in time."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from closed_form import simulate
 from overhung_pump import SEGMENT, pump
+from rings import in_ring
 from trial_rig import STEEL, trial_rig
 
 from rubhpc import LumpedStator, Probe, Rig, Unbalance
@@ -39,9 +39,7 @@ def turbine():
 
 def ring():
     """Eight cantilevers around a disc between bearings."""
-    rig = trial_rig()
-    tips = tuple(replace(rig.stator[0], angle=2.0 * math.pi * i / 8) for i in range(8))
-    return replace(rig, stator=tips)
+    return in_ring(trial_rig(), 8)
 
 
 def sideways(name, node, angle, quantity="acceleration"):

@@ -32,12 +32,7 @@ rise = run_up(trial_rig(1), start=165.0, stop=175.0, time=0.08, **case)
 found += [float(rise["peak_contact_force"].max()), float(rise["friction_work"].sum())]
 print(json.dumps(found))
 """
-LAWS = [
-    {},
-    {"friction_law": "coulomb"},
-    {"law": "penalty", "stiffness": 1e6},
-    {"law": "penalty", "stiffness": 1e6, "friction_law": "coulomb"},
-]
+LAWS = [{}, {"law": "penalty", "stiffness": 1e6, "friction_law": "coulomb"}]  # closed form, collocation
 
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: " ".join(map(str, law.values())))

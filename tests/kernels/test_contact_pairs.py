@@ -43,7 +43,7 @@ angles = st.floats(0.0, 2 * math.pi)
 displacements = st.lists(st.floats(-5e-3, 5e-3), min_size=N_DEGREE, max_size=N_DEGREE).map(np.array)
 
 
-def make_pairs(angle, friction=0.3, *, is_updated=False, compliance=None, aside=0.0):
+def make_pairs(angle, friction=0.3, *, is_updated=False, compliance=None, aside=0.0, law=MULTIPLIER):
     """Pairs at the angles (q,), their degrees in rows 0 to 5 q."""
     axis = np.exp(1j * np.atleast_1d(angle))
     q = axis.size
@@ -59,7 +59,7 @@ def make_pairs(angle, friction=0.3, *, is_updated=False, compliance=None, aside=
         friction=np.full(q, friction),
         compliance=np.zeros((q, N_DEGREE, q, N_DEGREE)) if compliance is None else compliance,
         is_updated=is_updated,
-        law=MULTIPLIER,
+        law=law,
     )
 
 
@@ -231,21 +231,11 @@ def thrown_pairs(draw):
     """Pairs at any angles, with any symmetric compliance, some of which penetrate in the step."""
     q = draw(st.integers(1, 4))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
-    root = rng.normal(size=(5 * q, 5 * q))
-    compliance = 1e-9 * (root @ root.T / (5 * q) + np.eye(5 * q))
-    rows = np.arange(q * N_DEGREE).reshape(q, N_DEGREE)
-    angle = rng.uniform(0, 2 * math.pi, q)
-    pairs = Pairs(
-        row=rows,
-        block=np.zeros_like(rows),
-        axis_y=np.cos(angle),
-        axis_z=np.sin(angle),
-        radius=np.full(q, RADIUS),
-        clearance=np.full(q, 1e-4),
-        aside=np.zeros(q),
-        friction=np.full(q, draw(st.sampled_from([0.0, 0.1, 0.4])) * draw(st.sampled_from([1.0, -1.0]))),
-        compliance=compliance.reshape(q, 5, q, 5),
+    pairs = make_pairs(
+        rng.uniform(0, 2 * math.pi, q),
+        draw(st.sampled_from([0.0, 0.1, 0.4])) * draw(st.sampled_from([1.0, -1.0])),
         is_updated=draw(st.booleans()),
+        compliance=flexible(rng, q),
         law=COULOMB,
     )
     end = rng.normal(scale=2e-4, size=(q, 5))

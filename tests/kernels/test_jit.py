@@ -171,11 +171,3 @@ def test_division_by_zero_yields_infinity():
     """As in NumPy: a kernel never raises."""
     assert quotient(1.0, 0.0) == math.inf
     assert math.isnan(quotient(0.0, 0.0))
-
-
-def test_cases_run_without_compilation():
-    case = "speed_ratio=1.2, clearance='100 um', friction=0.1, revolutions=1, transient=1"
-    script = f"import rubhpc; print(rubhpc.simulate('mokhtar2017', {case}, samples_per_revolution=16).status)"
-    environ = environment() | {"NUMBA_DISABLE_JIT": "1"}
-    said = subprocess.run([sys.executable, "-c", script], env=environ, capture_output=True, text=True)
-    assert said.stdout == "1\n", said.stderr

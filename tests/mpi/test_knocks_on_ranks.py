@@ -7,7 +7,6 @@ import time
 import pytest
 from running import each_launcher, run, start, write_knocks
 
-from rubhpc.errors import InputError
 from rubhpc.knock_cases import LeastKnock, Progress, search_of
 from rubhpc.knocks import least_knock
 from rubhpc.running.knocks_on_ranks import least_knock_on
@@ -39,14 +38,6 @@ def test_ranks_find_what_one_process_finds(tmp_path):
     study = read_study(write_knocks(tmp_path, RUBBING))
     found = least_knock_on(Pool(), lambda: study, **HOW, progress=tmp_path / "kept", report=lambda *_: None)
     assert found.identical(least_knock(study, **HOW))
-
-
-def test_what_cannot_be_searched_is_refused(tmp_path):
-    study = read_study(write_knocks(tmp_path, RUBBING))
-    with pytest.raises(InputError, match="angles 0"):
-        least_knock_on(
-            Pool(), lambda: study, **HOW | {"angles": 0}, progress=tmp_path / "kept", report=lambda *_: None
-        )
 
 
 @pytest.mark.long

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 import rubhpc
 from postproc.cases.reduction import reduce_store
 from postproc.figures.bifurcation import bifurcation
-from postproc.figures.branch_lines import events_at, mark_over_map, runs
+from postproc.figures.branch_lines import events_at, mark_over_map
 from postproc.figures.multipliers import at_edges, multipliers
 from postproc.report.budget import write_report
 from postproc.report.page import Page
@@ -67,16 +67,6 @@ def test_points_have_a_coordinate_for_every_axis(store):
     modulus = np.hypot(one.multiplier_real, one.multiplier_imag)[:, 0]
     assert np.array_equal(one.stability.values == 1, modulus.values < 1.0)
     assert np.isfinite(one.section_vertical.values).sum() == int(one.period.sum())
-
-
-def test_stability_changes_at_events_alone(store):
-    points = rubhpc.open(store / "branches.zarr")
-    is_next = np.diff(points.branch) == 0
-    changes = np.flatnonzero(is_next & (np.diff(points.stability) != 0))
-    events = points.event.values
-    assert changes.size
-    assert ((events[changes] != 0) | (events[changes + 1] != 0)).all()
-    assert sum(rows.size for rows in runs(points)) >= points.sizes["point"]
 
 
 def test_a_case_says_how_far_it_has_come(store, monkeypatch):

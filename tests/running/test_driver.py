@@ -15,7 +15,7 @@ import xarray as xr
 from running import array_of, journalled_cases, write_sample, write_study
 from stub_physics import Physics, record
 
-from rubhpc.errors import InputError, RubError, StoppedEarly, StoreError
+from rubhpc.errors import RubError, StoppedEarly, StoreError
 from rubhpc.integrate.compilation import compilation
 from rubhpc.running import computing, job, stopping, worker
 from rubhpc.running.case_setup import count_set_ups
@@ -296,14 +296,6 @@ def test_a_disk_that_fills_up_keeps_what_is_there(physics, study, monkeypatch):
     assert not verify(study.output)
 
 
-def test_the_store_is_free_again_after_any_end(physics, study):
-    after(1, lambda: os.kill(os.getpid(), signal.SIGTERM), physics)
-    with pytest.raises(StoppedEarly):
-        run(study, quiet=True)
-    with Store(study.output).lock():
-        pass
-
-
 def test_a_block_found_damaged_on_the_way_is_computed_whole(physics, study):
     """Its kept case no longer matches its checksum, so it is not carried over into the new chunk."""
     physics.poison = raise_error
@@ -329,11 +321,6 @@ def test_an_error_of_the_programs_own_leaves_its_traceback_in_a_log(physics, stu
     (log,) = (study.output / ".rubhpc" / "logs").iterdir()
     assert str(log) in str(reported.value)
     assert "burst" in log.read_text()
-
-
-def test_an_unknown_file_is_bad_input(tmp_path):
-    with pytest.raises(InputError, match=r"nowhere.toml"):
-        run(tmp_path / "nowhere.toml")
 
 
 def test_progress_goes_to_the_output_and_quiet_says_nothing(physics, study, capsys):

@@ -12,11 +12,10 @@ from running import array_of, write_study
 
 from rubhpc import __version__
 from rubhpc.errors import StoreError
-from rubhpc.schema import DIVERGED, DONE, FAILED, FINAL_STATE, MISSING, STATE, VARIABLES
+from rubhpc.schema import DONE, FAILED, FINAL_STATE, MISSING, STATE, VARIABLES
 from rubhpc.storage import layout
 from rubhpc.storage.disk import disk_errors, write_whole
 from rubhpc.storage.journal import Entry
-from rubhpc.storage.manifest import Manifest
 from rubhpc.storage.resume import bring_up_to_date, cases_without_files, differences, grid_for, open_store
 from rubhpc.storage.store import Store, case_checksum
 from rubhpc.study.cases import CaseGrid
@@ -124,11 +123,6 @@ def test_a_chunk_is_written_as_zarr_writes_it(store):
         assert [path.read_bytes() for path in store.chunk_files(start)] == ours
 
 
-def test_blocks_cover_the_grid_once(store):
-    flats = np.concatenate([store.flat(start) for start in store.blocks()])
-    assert sorted(flats.tolist()) == list(range(store.manifest.n_case))
-
-
 def test_blocks_and_flat_indices_are_those_of_the_sweep(study, store):
     case_grid = CaseGrid(study)
     for block in case_grid.blocks():
@@ -159,30 +153,6 @@ def test_a_store_is_packed_again_only_when_there_is_news(store):
     journal(store, (1, 0, 0), fill(store, (1, 0, 0)))
     store.pack(store.replay())
     assert array_of(store.path, "steps")[0, 0, 0] == 0
-
-
-def test_lengthened_axes_keep_what_is_there(tmp_path, study, store):
-    start = (1, 1, 2)
-    data = fill(store, start)
-    journal(store, start, data)
-    longer = read_study(write_study(tmp_path, "longer.toml", speed_ratio=[0.9, 2.0, 3.0]))
-    axes = (*longer.axes[:2], replace(longer.axes[2], values=(0.1, 0.3, 0.5, 0.7)))
-    case_grid = grid_for(replace(longer, axes=axes))
-    bring_up_to_date(store, case_grid)
-    again = Store(study.output)
-    assert again.manifest.shape == (3, 2, 4)
-    ledger = again.replay()
-    at = np.ravel_multi_index(start, (3, 2, 4))
-    assert np.flatnonzero(ledger.status).tolist() == [at]
-    assert case_checksum(again.read_block(start), 0) == ledger.checksum[at]
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        ds = xr.open_zarr(study.output)
-    assert dict(ds.sizes) | {"speed_ratio": 3, "friction": 4} == dict(ds.sizes)
-    assert ds.friction.values.tolist() == [0.1, 0.3, 0.5, 0.7]
-    assert ds.spin_speed.shape == (3,)
-    np.testing.assert_array_equal(ds.vertical.values[1, 1, 2], data["vertical"][0])
-    assert ds.attrs["study"]["grid"]["speed_ratio"]["values"] == [0.9, 2.0, 3.0]
 
 
 @pytest.mark.parametrize(
@@ -307,31 +277,6 @@ def test_gone_and_empty_files_are_found(store):
     assert cases_without_files(store, store.replay()) == expected
 
 
-def test_a_garbled_chunk_reads_as_none(store):
-    fill(store, (0, 0, 0))
-    store.chunk_files((0, 0, 0))[0].write_bytes(b"garbage")
-    assert store.read_block((0, 0, 0)) is None
-
-
-def test_damaged_coordinates_are_written_anew(study, store):
-    chunk = store.path / "spin_speed" / "c" / "0"
-    whole = chunk.read_bytes()
-    chunk.write_bytes(whole[:-1] + bytes([whole[-1] ^ 1]))
-    damaged = Store(study.output)
-    assert damaged.damaged_files() == ["spin_speed/c/0"]
-    bring_up_to_date(damaged, CaseGrid(study))
-    assert Store(study.output).damaged_files() == []
-    assert chunk.read_bytes() == whole
-
-
-def test_partial_files_are_removed_on_the_way(study, store):
-    stray = store.path / "vertical" / "c" / "0.12ab.partial"
-    stray.parent.mkdir(parents=True, exist_ok=True)
-    stray.write_bytes(b"half")
-    bring_up_to_date(store, CaseGrid(study))
-    assert not stray.exists()
-
-
 def change_byte(path: Path, at: int) -> None:
     data = bytearray(path.read_bytes())
     data[at % len(data)] ^= 0x20
@@ -378,11 +323,6 @@ def test_damaged_metadata_are_written_anew(study, store, name, text):
     np.testing.assert_array_equal(xr.open_zarr(store.path).vertical.values[0, 0, :2], data["vertical"])
 
 
-def test_cases_are_named_by_their_coordinates(store):
-    assert store.manifest.name_case(11) == "speed_ratio=2, clearance_ratio=0.85, friction=0.5"
-    assert Manifest.read(store.path) == store.manifest
-
-
 @pytest.mark.parametrize(
     ("number", "fix"),
     [
@@ -410,15 +350,6 @@ def test_a_file_written_whole_replaces_the_old_one_or_leaves_it(tmp_path, monkey
         write_whole(path, b"new")
     assert path.read_bytes() == b"old"
     assert [p.name for p in tmp_path.iterdir()] == ["file"]
-
-
-def test_a_diverged_case_keeps_its_metrics(store):
-    row = np.zeros((), store.manifest.header.record_type)
-    row["steps"] = 1234
-    with store.journal(1, "rank00000") as lines:
-        lines.write([Entry(0, "a", DIVERGED, 0, row.tobytes(), "grew")])
-    packed = store.packed_values(store.replay())
-    assert packed["steps"].ravel()[:2].tolist() == [1234, -1]
 
 
 def test_a_file_on_the_way_to_a_store_is_reported_with_the_fix(tmp_path):

@@ -1,11 +1,11 @@
 """Machines drawn at random: bearings, discs, stators, laws and probes of every kind, and a case of each."""
 
-import math
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from random_rigs import PACKAGED
+from rings import in_ring
 
 from rubhpc.rig.reading import with_keys
 from rubhpc.rig.rig import Rig
@@ -62,8 +62,7 @@ def random_machine(seed: int) -> tuple[Rig, dict[str, Any]]:
         kind = LumpedStator(node=node, radius=radius, mass=mass, stiffness=stiffness, damping=5.0)
     n_most = 2 if "normal" in LAWS[law] else 8
     n_stator = int(random.choice([n for n in (1, 1, 2, 3, 5, 8) if n <= n_most]))
-    stators = tuple(replace(kind, angle=2.0 * math.pi * i / n_stator) for i in range(n_stator))
-    rig = replace(PACKAGED, rotor=replace(rotor, gravity=gravity), stator=stators)
+    rig = in_ring(replace(PACKAGED, rotor=replace(rotor, gravity=gravity), stator=(kind,)), n_stator)
     damping = {"rotor.damping.alpha": 10 ** random.uniform(0.5, 1.6)}
     if random.random() < 0.4:
         damping["rotor.damping.beta"] = 10 ** random.uniform(-6.0, -4.5)

@@ -16,7 +16,6 @@ from rubhpc.fem.annular import annular_rub
 from rubhpc.fem.modes import modes
 from rubhpc.integrate.measuring.monitors import tip_deflection
 from rubhpc.integrate.measuring.samples import empty_samples, new_accumulator
-from rubhpc.rig.reading import rig_from_dict
 
 BASE = read_rig("mokhtar2017")
 MASS, STIFFNESS, INERTIA, TORSIONAL = 2.0, 5e5, 0.02, 2e4
@@ -228,12 +227,6 @@ def test_a_ring_of_masses_agrees_with_equations_written_in_the_plane():
     np.testing.assert_allclose(found.vertical, exact[0], atol=2e-4 * scale)
     np.testing.assert_allclose(found.horizontal, exact[1], atol=2e-4 * scale)
     np.testing.assert_allclose(found.carrier_displacement, np.hypot(*exact[2:4]).max(), rtol=1e-3)
-
-
-def test_a_rig_with_a_carrier_is_read_back_from_its_description():
-    rig = ring()
-    assert assemble(rig_from_dict(rig.as_dict())).carriers[0].stators == tuple(range(1, 9))
-    assert "carrier" not in BASE.as_dict()
 
 
 @pytest.mark.parametrize(

@@ -149,10 +149,13 @@ PAIR = tuple(replace(ON_STATOR.stator[0], angle=math.pi + turn) for turn in (-0.
         (crossed(replace(ON_STATOR, stator=PAIR)), {}),
         (crossed(with_keys(ON_STATOR, {"stator.geometry": "second_order"})), {"normal": "updated"}),
         (ON_STATOR, {"law": "penalty", "stiffness": 5e6, "friction_law": "coulomb"}),
+        (ON_STATOR, {"law": "penalty", "stiffness": 5e6, "normal": "updated"}),
+        (ON_STATOR, {"law": "penalty", "stiffness": 5e6, "initial": {"impulse": 1e-15}}),
+        (ON_STATOR, {"law": "penalty", "stiffness": 5e6, "method": "central-difference", "step": "0.5 us"}),
     ],
 )
 def test_rest_on_a_stator_is_an_equilibrium(rig, keys):
-    """Also with circulation, of which no strain energy knows, and on the springs of a penalty."""
+    """Also with circulation, of which no strain energy knows, on a penalty's springs, and after no knock."""
     record = simulate(rig, speed=FAST, clearance="150 um", friction=0.0, transient=0, revolutions=1, **keys)
     assert (record.contact_force[:, 0] > 5.0).all()
     assert np.ptp(record.vertical) < 1e-11

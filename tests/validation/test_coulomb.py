@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from closed_form import Contact, read_rig, simulate
 from lone_bodies import body, set_up, set_up_modal, tip
+from rings import in_ring
 
 from rubhpc import State
 from rubhpc.integrate.case import run_case
@@ -121,15 +122,8 @@ def test_slip_is_stopped_by_all_that_it_moves(scheme):
     assert side == pytest.approx(-impulse / lateral, rel=1e-3)
 
 
-@pytest.fixture(scope="module")
-def ring():
-    """The packaged rig with three stators 120 degrees apart."""
-    rig = read_rig("mokhtar2017")
-    angles = (0.0, 2 * math.pi / 3, 4 * math.pi / 3)
-    return replace(rig, stator=tuple(replace(rig.stator[0], angle=angle) for angle in angles))
-
-
-def test_dry_whip_diverges_in_steady_sliding_and_settles_under_coulombs_law(ring):
+def test_dry_whip_diverges_in_steady_sliding_and_settles_under_coulombs_law():
+    ring = in_ring(read_rig("mokhtar2017"), 3)
     given = {"speed_ratio": 0.75, "clearance": "60 um", "friction": 0.3, "keep": "waveform"}
     assert simulate(ring, **given, transient=0, revolutions=20).status == DIVERGED
     steps = {"method": "central-difference", "step": "2 us", "friction_law": "coulomb"}

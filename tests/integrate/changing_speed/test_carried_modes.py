@@ -1,10 +1,8 @@
 """What a change of range does to a motion amid contacts of equal stators."""
 
-import math
-from dataclasses import replace
-
 import numpy as np
 from closed_form import run_up
+from rings import in_ring
 from trial_rig import trial_rig
 
 from rubhpc.integrate.changing_speed import speed_ranges
@@ -15,8 +13,6 @@ DRIVE = {"torque": 0.3, "inertia": 2e-3, "lowest": 20.0, "start": 250.0, "revolu
 
 def whip_of(monkeypatch, count):
     """A drive in a ring, and how much of its velocity each change of range takes, by pairs closed."""
-    rig = trial_rig(1)
-    ring = tuple(replace(rig.stator[0], angle=0.3 + 2.0 * math.pi * i / count) for i in range(count))
     changes, goes_over = [], Passing.goes_over
 
     def watched(passing, setup, begun, before, jump=0.0):
@@ -33,7 +29,7 @@ def whip_of(monkeypatch, count):
     monkeypatch.setattr(Passing, "goes_over", watched)
     monkeypatch.setattr(speed_ranges, "WIDEST", 0.005)  # narrow ranges
     found = run_up(
-        replace(rig, stator=ring),
+        in_ring(trial_rig(1), count, first=0.3),
         drive=DRIVE,
         clearance=3e-5,
         friction=0.2,

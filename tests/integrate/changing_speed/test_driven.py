@@ -235,15 +235,6 @@ def test_a_heavy_drive_prescribes_the_speed():
         assert np.abs(found[name].values - other).max() < 5e-3 * np.abs(other).max()
 
 
-def test_pieces_are_as_short_as_the_torque_asks_for():
-    keys = {"clearance": 1e-3, "friction": 0.3, "law": "penalty", "stiffness": 2e5, "damping": 20.0}
-    found, fine = (driven(RIG, 180.0, 8, 32, pieces, **keys) for pieces in (None, 4))
-    assert fine.contact_fraction.max() > 0.1
-    assert found.time.values == pytest.approx(fine.time.values, abs=5e-5)
-    scale = np.abs(fine.vertical.values).max()
-    assert np.abs(found.vertical - fine.vertical).max() < 0.02 * scale
-
-
 def test_torques_are_linear_between_speeds_and_constant_beyond():
     law = DriveLaw(torque=(4.0, 2.0, -1.0), speed=(10.0, 20.0, 50.0), start=5.0, n_revolution=9, lowest=1.0)
     assert [law.at(speed) for speed in (0.0, 10.0, 15.0, 30.0, 50.0, 90.0)] == pytest.approx(

@@ -1,18 +1,17 @@
 """The pieces of a drive: the twist does not jump between them, and touches make them short."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from closed_form import run_up
-from overhung_pump import SEGMENT, pump
+from overhung_pump import pump
+from rings import in_ring
 
 from rubhpc import LumpedStator, Probe, Rig, Unbalance
 from rubhpc.integrate.changing_speed.free_piece import Spin
 from rubhpc.integrate.changing_speed.passing import Passing
 
-TIPS = tuple(LumpedStator(node=6, angle=0.2 + i * math.pi / 4, **SEGMENT) for i in range(8))
 DRIVE = {"torque": [8.0, 2.0], "speed": [0.0, 600.0], "inertia": 5e-3, "start": 320.0, "revolutions": 12}
 
 
@@ -30,7 +29,7 @@ def test_twist_of_pieces_by_default_is_that_of_short_ones():
         "probes": (Probe(name="twist", node=6, quantity="twist_acceleration"),),
         "accuracy": 1e-3,
     }
-    rig = replace(pump(), stator=TIPS)
+    rig = in_ring(pump(), 8, first=0.2)
     found, fine = run_up(rig, **case), run_up(rig, **case, pieces_per_revolution=32)
     assert fine.contact_fraction.max() > 0.1
     window = np.hanning(fine.sizes["sample"])

@@ -1,13 +1,12 @@
 """Memory of the matrices of a run-up or drive is bounded, however many ranges of speed it passes."""
 
 import gc
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from closed_form import run_up
 from overhung_pump import pump
-from test_run_up_machines import TIPS
+from rings import in_ring
 
 from rubhpc import recent
 from rubhpc.integrate.changing_speed import pieces, speed_ranges
@@ -22,7 +21,7 @@ BENDS = {"speed_law": [(0.0, 300.0), (0.05, 310.0), (0.07, 330.0), (0.12, 334.0)
     ids=["drive", "run-up"],
 )
 def test_memory_of_many_ranges_is_bounded(motion, budget, monkeypatch):
-    rig, made, hold = replace(pump(), stator=TIPS), [], speed_ranges.SpeedRanges.hold
+    rig, made, hold = in_ring(pump(), 8, first=0.2), [], speed_ranges.SpeedRanges.hold
 
     def noted(*args):
         made.append(hold(*args))
@@ -52,7 +51,7 @@ def test_memory_of_many_ranges_is_bounded(motion, budget, monkeypatch):
 
 def test_what_is_kept_of_a_set_up_goes_with_it():
     """Hundreds of megabytes of a machine, in a process that computes other ones after it."""
-    run_up(replace(pump(), stator=TIPS), clearance=1e-4, friction=0.05, samples_per_revolution=64, **BENDS)
+    run_up(in_ring(pump(), 8, first=0.2), clearance=1e-4, friction=0.05, samples_per_revolution=64, **BENDS)
     kept = pieces._KNOWN, pieces._RIPPLES, speed_ranges._BUFFERS
     assert all(kept)
     recent.forget()

@@ -1,20 +1,20 @@
 """A run-up of an overhung pump in a ring of eight, under gravity, held to stepping of all its degrees."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from closed_form import run_up
-from overhung_pump import SEGMENT, pump
+from overhung_pump import pump
+from rings import in_ring
 
-from rubhpc import LumpedStator, Probe
+from rubhpc import Probe
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.probes import with_probes
 from rubhpc.integrate.packing import whole_system
 from rubhpc.study.speed_law import SpeedLaw
 
-TIPS = tuple(LumpedStator(node=6, angle=0.2 + i * math.pi / 4, **SEGMENT) for i in range(8))
+PUMP = in_ring(pump(), 8, first=0.2)
 PROBES = (
     Probe(name="bearing", node=4, angle=math.pi / 2, quantity="acceleration"),
     Probe(name="span", node=2, angle=0.3, quantity="acceleration"),
@@ -39,7 +39,7 @@ def stepped(rig):
     spinning[: rotor.n_dof] = [name == "thx" for _, name in rotor.degrees]
     v, w, twist = (rotor.index(6, name) for name in ("v", "w", "thx"))
     gap, force_direction = np.zeros((2, 8, n))
-    for i, tip in enumerate(TIPS):
+    for i, tip in enumerate(PUMP.stator):
         c, s = math.cos(tip.angle), math.sin(tip.angle)
         gap[i, [v, w, model.stator_start[i]]] = -c, -s, 1.0
         friction = CONTACT["friction"]
@@ -84,10 +84,9 @@ def stepped(rig):
 
 @pytest.fixture(scope="module")
 def expected():
-    rig = replace(pump(), stator=TIPS)
-    signals, least = stepped(rig)
+    signals, least = stepped(PUMP)
     assert least < -1e-6
-    return rig, signals
+    return signals
 
 
 FINE = {"accuracy": 1e-5, "pieces_per_revolution": 16}
@@ -98,9 +97,8 @@ FINE = {"accuracy": 1e-5, "pieces_per_revolution": 16}
 )
 def test_accelerations_at_nodes_meet_stepping_of_all_degrees(expected, settings, allowed):
     """By default, with matrices held over ranges of speed, and with fine ranges and pieces."""
-    rig, signals = expected
     found = run_up(
-        rig,
+        PUMP,
         **LAW,
         **CONTACT,
         **settings,
@@ -109,7 +107,7 @@ def test_accelerations_at_nodes_meet_stepping_of_all_degrees(expected, settings,
         samples_per_revolution=PER_REVOLUTION,
         probes=PROBES,
     )
-    for probe, signal in zip(PROBES, signals, strict=True):
+    for probe, signal in zip(PROBES, expected, strict=True):
         lines = np.fft.rfft((signal, found[f"probe_{probe.name}"].values) * np.hanning(signal.size))
         full, own = lines[:, :22]  # below order 11, where probes show the full model
         assert np.linalg.norm(own - full) < allowed * np.linalg.norm(full), probe.name

@@ -1,15 +1,12 @@
 """Contact modes that cannot be followed are solved at each piece: the motion is the same."""
 
-import math
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from closed_form import Contact
-from overhung_pump import SEGMENT, pump
+from overhung_pump import pump
+from rings import in_ring
 from test_steep_run_ups import machine
 
-from rubhpc import LumpedStator
 from rubhpc.integrate.changing_speed import range_library
 from rubhpc.integrate.changing_speed.case import record_run_up
 from rubhpc.integrate.setup import prepare
@@ -17,16 +14,14 @@ from rubhpc.study.initial import CONTACT_FREE, Initial
 from rubhpc.study.speed_law import SpeedLaw
 from rubhpc.study.study import Integrator, Recording
 
-SAMPLES, Q = 64, 6
+SAMPLES = 64
 LAW = SpeedLaw(time=(0.0, 0.15), speed=(300.0, 360.0))
 CASE = {"clearance": 1.5e-4, "friction": 0.05, "initial": Initial(from_=CONTACT_FREE)}
 
 
 def run(contact):
-    angles = 0.2 + 2.0 * math.pi / Q * np.arange(Q)
-    tips = tuple(LumpedStator(node=6, angle=float(angle), **SEGMENT) for angle in angles)
     setup = prepare(
-        replace(pump(), stator=tips),
+        in_ring(pump(), 6, first=0.2),
         360.0,
         contact=contact,
         integrator=Integrator(),

@@ -1,11 +1,11 @@
 """Kernels that are compiled for arrays which share no memory (`jit_apart_sum`) are given such arrays."""
 
-from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 import pytest
 from closed_form import read_rig, run_up, simulate
+from rings import in_ring
 
 from rubhpc.integrate.marches import event_driven
 
@@ -49,11 +49,10 @@ def shared(arrays):
 
 @pytest.mark.parametrize("n_stator", [1, 3])
 def test_cases_and_their_proofs(given, n_stator):
-    rig = read_rig("mokhtar2017")
-    ring = [replace(rig.stator[0], angle=2.0 * np.pi * i / n_stator) for i in range(n_stator)]
+    rig = in_ring(read_rig("mokhtar2017"), n_stator)
     case = {"speed_ratio": 1.3, "clearance_ratio": 0.8, "revolutions": 16, "samples_per_revolution": 32}
     for transient in (20, "direct"):
-        simulate(replace(rig, stator=tuple(ring)), transient=transient, **case)
+        simulate(rig, transient=transient, **case)
     assert len(given) > 3
     assert not [pair for arrays in given for pair in shared(arrays)]
 

@@ -6,11 +6,12 @@ from dataclasses import replace
 import corpus
 import numpy as np
 import pytest
-from closed_form import read_rig, run_up, simulate
+from closed_form import read_rig, simulate
 from contact_answers import masses
 from independent_contact import run
 from record_distance import MOTIONS
 from reference_bodies import squared_slope
+from rings import in_ring
 from trial_rig import trial_rig
 
 import rubhpc
@@ -24,6 +25,7 @@ from rubhpc.integrate.scheme import Scheme
 from rubhpc.recent import forget
 from rubhpc.rig.reading import with_keys
 from rubhpc.rig.stators import LumpedStator, MatrixStator
+from rubhpc.schema import SCHEMES
 
 RUB = {"speed": 170.0, "clearance": "80 um", "friction": 0.2, "transient": 0, "revolutions": 2}
 CLOSE = RUB | {"clearance": "40 um"}
@@ -181,10 +183,9 @@ def test_closed_gaps_are_closed_and_forces_press(n_stator):
 def test_forces_of_a_bent_ring_are_those_of_finer_steps():
     """Eight bent stators under a whip, four of them closed at a time."""
     packaged = with_keys(read_rig("mokhtar2017"), {"stator.geometry": "second_order"})
-    turned = (replace(packaged.stator[0], angle=i * math.pi / 4) for i in range(8))
     case = {"speed_ratio": 0.98, "clearance": "20 um", "friction": 0.3, "normal": "updated"}
     case |= {"transient": 1, "revolutions": 1, "samples_per_revolution": 64, "keep": ("waveform",)}
-    ring = replace(packaged, stator=tuple(turned))
+    ring = in_ring(packaged, 8)
     fine, found = (simulate(ring, **case, accuracy=accuracy) for accuracy in (1e-5, 1e-3))
     assert found.contact_fraction.sum() > 2.0
     assert found.energy_residual < 1e-3
@@ -218,20 +219,16 @@ def both(name, **given):
     return by(collocation.CollocationMarch, name, **given), by(EventDrivenMarch, name, **given)
 
 
-SMOOTH = ("sliding, below", "sliding, gravity", "sliding, tabulated", "sliding, pump", "coulomb, below")
-SMOOTH += ("coulomb, above", "coulomb, slow rim", "coulomb, tabulated", "static ratio", "penalty, below")
-SMOOTH += ("penalty, tabulated", "penalty and coulomb", "restitution, lone", "restitution and coulomb, lone")
+SMOOTH = ("sliding, below", "sliding, gravity", "sliding, tabulated", "sliding, pump", "restitution, lone")
 BOUNCING = ("sliding, two", "sliding, three", "sliding, reversed", "sliding, ring of 8")
-BOUNCING += ("sliding, ring of 16", "sliding, carried", "sliding, pump in 8", "coulomb, two")
-BOUNCING += ("coulomb, reversed", "coulomb, carried", "coulomb, lone, soft", "coulomb, ring of 8")
-BOUNCING += ("coulomb, ring of 16", "coulomb, pump in 8", "restitution, below", "restitution and coulomb")
-BOUNCING += ("penalty, ring of 8", "penalty and coulomb, ring of 8")
+BOUNCING += ("sliding, ring of 16", "sliding, carried", "sliding, pump in 8", "restitution, below")
 
 
 @pytest.mark.parametrize("name", SMOOTH + BOUNCING)
 def test_a_fixed_normal_is_that_of_the_closed_form(name):
-    """Every law and machine; bounces within a share of a contact may be counted otherwise."""
+    """Laws that have one, on every machine; bounces within a share of a contact may be counted otherwise."""
     found, known = both(name, accuracy=1e-4)
+    assert (SCHEMES[found.scheme], SCHEMES[known.scheme]) == ("collocation", "event_driven")
     assert known.contact_impulse.any()
     for signal in (*MOTIONS, "contact_force"):
         one, other = found.signals[signal], known.signals[signal]
@@ -248,14 +245,7 @@ def test_a_fixed_normal_is_that_of_the_closed_form(name):
         assert found.reversals_per_revolution == pytest.approx(known.reversals_per_revolution)
 
 
-def test_a_pair_that_slid_sticks_within_the_friction_of_sliding():
-    """Not within that of rest, where its slip turns: then it slides on."""
-    found, known = both("static ratio, ring of 8", revolutions=6)
-    assert known.stick_fraction.min() > 0.1
-    assert found.stick_fraction == pytest.approx(known.stick_fraction, abs=1e-3)
-
-
-@pytest.mark.parametrize("name", ["sliding, walls", "coulomb, walls", "penalty, walls", "restitution, walls"])
+@pytest.mark.parametrize("name", ["sliding, walls", "restitution, walls"])
 def test_walls_are_those_of_the_closed_form(name):
     """For a revolution: rounding grows by ten in two. Contacts that part within tolerance do not chatter."""
     found, known = both(name, accuracy=1e-4, revolutions=1)
@@ -264,15 +254,6 @@ def test_walls_are_those_of_the_closed_form(name):
         assert one == pytest.approx(other, rel=0, abs=1e-3 * abs(other).max()), signal
     assert found.contact_impulse == pytest.approx(known.contact_impulse, rel=1e-3)
     assert found.steps < 10_000
-
-
-@pytest.mark.parametrize("name", ["penalty, below", "penalty and coulomb"])
-def test_springs_without_dampers_are_those_of_the_closed_form(name):
-    found, known = both(name, accuracy=1e-4, damping=0.0)
-    for signal in (*MOTIONS, "contact_force"):
-        one, other = found.signals[signal], known.signals[signal]
-        assert one == pytest.approx(other, rel=0, abs=1e-3 * abs(other).max()), signal
-    assert found.contacts_per_revolution == pytest.approx(known.contacts_per_revolution)
 
 
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-4, 1e-5])
@@ -345,39 +326,6 @@ def test_cases_before_change_no_bit():
         assert again.signals[name].tobytes() == signal.tobytes(), name
     assert again.steps == alone.steps
     assert again.energy_residual == alone.energy_residual
-
-
-STRIBECK = {"friction_law": "stribeck", "static_friction_ratio": 1.0, "stribeck_speed": 0.1}
-
-
-@pytest.mark.parametrize("rig", [trial_rig(1, radius=5e-4), trial_rig(3)], ids=["slow rim", "three"])
-def test_stribecks_law_without_an_excess_is_coulombs(rig):
-    """Its coefficient is constant; it has no closed form, and Coulomb's has."""
-    given = CLOSE | {"speed": 120.0, "friction": 0.6, "clearance": "20 um", "accuracy": 1e-4}
-    found = simulate(rig, **given, **STRIBECK)
-    known = simulate(rig, **given, friction_law="coulomb")
-    assert known.stick_fraction.max() > 0.05
-    for name in (*MOTIONS, "contact_force"):
-        one, other = getattr(found, name), getattr(known, name)
-        assert one == pytest.approx(other, rel=0, abs=1e-3 * abs(other).max()), name
-    assert found.stick_fraction == pytest.approx(known.stick_fraction, abs=1e-3)
-
-
-RUN_UP = {"start": 185.0, "stop": 209.0, "time": 0.4}
-DRIVE = {"drive": {"torque": 0.3, "inertia": 2e-3, "lowest": 20.0, "start": 200.0, "revolutions": 10}}
-
-
-@pytest.mark.parametrize("law", [RUN_UP, DRIVE], ids=["run-up", "drive"])
-def test_a_run_up_is_that_of_the_closed_form(law):
-    given = law | {"clearance": "60 um", "friction": 0.2, "samples_per_revolution": 64, "accuracy": 1e-4}
-    found = run_up(trial_rig(2), **given, **STRIBECK)
-    known = run_up(trial_rig(2), **given, friction_law="coulomb")
-    assert np.count_nonzero(known.contact_fraction) > 5
-    for name in ("speed", "vertical", "horizontal", "torsion", "stator_axial", "contact_force"):
-        one, other = found[name].values, known[name].values
-        assert one == pytest.approx(other, rel=0, abs=1e-3 * np.abs(other).max()), name
-    work = known.friction_work.values
-    assert found.friction_work.values == pytest.approx(work, rel=0, abs=1e-3 * work.max())
 
 
 def test_a_force_that_only_turns_takes_long_steps():

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from closed_form import Contact, read_rig, simulate
 from record_distance import MOTIONS
+from rings import in_ring
 from trial_rig import trial_rig, turn
 
 from rubhpc import State
@@ -221,10 +222,8 @@ def test_unusual_cases_agree_with_the_central_difference(rig, speed, clearance, 
 
 @pytest.mark.parametrize("normal", ["fixed", "updated"])
 def test_dry_whip_diverges_and_says_so(normal):
-    rig = read_rig("mokhtar2017")
-    around = tuple(replace(rig.stator[0], angle=2 * math.pi * i / 3, lateral=False) for i in range(3))
     record = simulate(
-        replace(rig, stator=around),
+        in_ring(read_rig("mokhtar2017"), 3, lateral=False),
         speed=148.7,
         clearance="20 um",
         friction=0.8,

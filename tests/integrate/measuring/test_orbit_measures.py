@@ -35,14 +35,6 @@ def test_spectrum_of_stators_is_taken_one_by_one():
     assert spectrum[:, [4, 12]] == pytest.approx(np.array([[1.0, 0.0], [0.0, 7.0]]), abs=1e-12)
 
 
-def test_spectrum_keeps_the_energy():
-    """Parseval, for a signal of no special form."""
-    signal = np.random.default_rng(1).normal(size=10 * SAMPLES)
-    spectrum = amplitude_spectrum(signal)
-    power = spectrum[0] ** 2 + (spectrum[1:-1] ** 2).sum() / 2 + spectrum[-1] ** 2
-    assert power == pytest.approx(np.mean(signal**2))
-
-
 def orbit(n, revolutions=40, amount=0.1):
     """Vertical and horizontal motion of period n: forward whirl with a part of order 1 / n."""
     turn = angles(revolutions)

@@ -13,7 +13,6 @@ from rubhpc import LumpedStator, Rig, State, Unbalance
 from rubhpc.errors import InputError
 from rubhpc.integrate.periodic_motions.collocated_motion import followed_motion
 from rubhpc.integrate.periodic_motions.lyapunov_spectrum import exponents, kaplan_yorke_dimension
-from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.setup import prepare
 from rubhpc.study.study import Integrator, Recording
 
@@ -80,24 +79,6 @@ def test_impact_oscillator_has_the_exponents_of_its_map():
     assert found[0] > 0.25
     last = exponents_of(records[-1], 2)
     assert records[-1].kaplan_yorke_dimension == pytest.approx(1.0 + last[0] / -last[1])
-
-
-def test_impacts_alone_shrink_the_volume():
-    """Each takes a share restitution squared of it; without damping nothing else does."""
-    setup = prepare(
-        oscillator(), SPIN, contact=Contact(restitution=RESTITUTION), integrator=Integrator(step=1e-3),
-        samples_per_revolution=64,
-    )  # fmt: skip
-    begun = replace(State.at_rest(setup.model), rotor_velocity=np.array([0.3]))
-    motion = PiecewiseMotion(setup, 1e-12, 0.0, begun)
-    total = exponents(motion, 2, aligning=0, followed=40).sum()
-    at, states, n_impact = motion.start, motion.states, 0
-    for _ in range(40):
-        revolution = motion.revolve(at, states)
-        at, states = revolution.end, revolution.states
-        n_impact += sum(piece.touching.size for piece in revolution.pieces)
-    assert n_impact > 30
-    assert total == pytest.approx(2 * math.log(RESTITUTION) * n_impact / 40, rel=1e-8)
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,6 @@ from rubhpc.integrate.periodic_motions.collocated_motion import CollocatedMotion
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.periodic_motions.saltation import monodromy
 from rubhpc.integrate.setup import prepare
-from rubhpc.kernels.flow import RATE_BEGUN, RATE_ENDED
 from rubhpc.rig.reading import with_keys
 from rubhpc.study.study import Integrator, Recording
 
@@ -113,14 +112,3 @@ def test_what_an_inelastic_touch_stops_is_forgotten(name):
     motion = motion_of(*CASES[name])
     found = np.linalg.svd(monodromy(motion, [motion.revolve(motion.start, motion.states)]), compute_uv=False)
     assert np.count_nonzero(found < 1e-13 * found[0]) >= 2
-
-
-def test_release_changes_nothing():
-    """The motion and its rate go on, so that its saltation matrix is the identity."""
-    motion = motion_of(PAPER, 1.7, 0.7, 0.3)
-    revolution = motion.revolve(motion.start, motion.states)
-    pieces, rows = revolution.pieces, revolution.rows
-    release = next(i for i, piece in enumerate(pieces) if piece.crossing and not piece.touching.size)
-    before, after = rows.motions[release, RATE_ENDED], rows.motions[release + 1, RATE_BEGUN]
-    assert after == pytest.approx(before, abs=1e-9 * np.abs(before).max())
-    assert np.array_equal(pieces[release].after, pieces[release].before)

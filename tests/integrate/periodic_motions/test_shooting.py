@@ -1,13 +1,12 @@
 """Why a search for a periodic motion ends without one."""
 
-import math
-from dataclasses import replace
 from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from closed_form import periodic, read_rig, simulate
+from rings import in_ring
 
 from rubhpc.errors import NoPeriodicMotion
 from rubhpc.integrate import periodic_motion
@@ -82,9 +81,7 @@ def test_motion_that_has_just_touched_grazes(speed_ratio, clearance_ratio, resti
 
 def test_whip_of_more_than_a_thousand_events_in_a_slow_revolution(monkeypatch):
     """Three stators are rolled around 105 times, each with a touch, a stick, a slip and a release."""
-    rig = read_rig("mokhtar2017")
-    ring = tuple(replace(rig.stator[0], angle=2.0 * math.pi * i / 3) for i in range(3))
-    rig = replace(rig, stator=ring)
+    rig = in_ring(read_rig("mokhtar2017"), 3)
     case = {
         "speed_ratio": 0.03, "clearance": "3 um", "friction": 0.5, "friction_law": "coulomb", "keep": (),
         "samples_per_revolution": 256,

@@ -108,18 +108,6 @@ def exponents(tables, p):
 
 
 @pytest.mark.parametrize("mask", MASKS)
-def test_motion_comes_back_from_its_modal_coordinates(case, mask):
-    rng = np.random.default_rng(mask)
-    for angle in (0.0, 0.7, 4.0):
-        motion = admissible(case, mask, rng)
-        p, z = entered(case, mask, motion, angle)
-        back = (joined(case.tables, "motion", p) @ z).real
-        n = len(motion) // 2
-        for part in (slice(0, n), slice(n, None)):
-            assert back[part] == pytest.approx(motion[part], abs=1e-8 * abs(motion[part]).max())
-
-
-@pytest.mark.parametrize("mask", MASKS)
 def test_motion_obeys_the_equations_with_the_gaps_held(case, mask):
     """M x'' + C x' + K x = f + P N at random states and angles, N the force that the constraint needs."""
     rng = np.random.default_rng(10 + mask)
@@ -272,16 +260,6 @@ def test_no_switch_function_vanishes_in_the_time_proved(case, mask):
     assert len(granted) > 5
 
 
-def test_modes_of_a_ring_are_solved_when_first_met():
-    """Their tables have room for all of them."""
-    setup = prepare(
-        trial_rig(3), 150.0, contact=Contact(), integrator=Integrator(), samples_per_revolution=64
-    )
-    library = setup.library(FRICTION)
-    assert library.masks == [0]
-    assert all(library.add(mask) for mask in range(1, 8))
-
-
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 7, 8, 1023, 1024, 2**40 - 1])
 def test_longest_step_within_a_count_of_ticks(count):
     level = floor_log2(count)
@@ -311,19 +289,3 @@ def test_tables_of_many_pairs_hold_one_sample(monkeypatch):
     tables = setup.library(0.2).tables()
     assert tables.output.shape[2] == -(-(N_ROTOR_ROW + 9) // LANES) * LANES
     assert tables.power_re.shape[1] == setup.sample_level + 1
-
-
-def test_a_case_goes_on_with_tables_that_the_library_has_given_up():
-    setup = prepare(
-        trial_rig(3), 180.0, contact=Contact(), integrator=Integrator(), samples_per_revolution=64
-    )
-    library = setup.library(0.2)
-    for mask in (1, 2):
-        library.add(mask)
-    held = library.tables()
-    before = [field.copy() for field in held]
-    library.forget()
-    library.add(6)
-    assert library.masks == [0, 6]
-    for field, expected in zip(held, before, strict=True):
-        assert np.array_equal(field, expected)

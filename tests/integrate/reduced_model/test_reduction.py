@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from closed_form import read_rig
+from rings import in_ring
 from scipy.linalg import block_diag, eigvals
 from trial_rig import trial_rig
 
@@ -155,10 +156,7 @@ def test_unbalance_is_answered_at_any_speed(speed):
 @pytest.mark.parametrize("n_stator", [1, 8])
 def test_answers_of_a_ring_reduced_body_by_body(n_stator):
     """Accelerations over forces, of alike stators too: within the accuracy of those of all bodies at once."""
-    rig = read_rig("mokhtar2017")
-    (stator,) = rig.stator
-    ring = tuple(replace(stator, angle=2.0 * np.pi * i / n_stator) for i in range(n_stator))
-    model = assemble(replace(rig, stator=ring))
+    model = assemble(in_ring(read_rig("mokhtar2017"), n_stator))
     reduced = reduce_model(model, SPIN, 1e-3)
     for frequency in (0.0, SPIN, 1000.0):
         found, full = reduced_answer(reduced, frequency), full_answer(model, frequency, SPIN)
