@@ -6,8 +6,8 @@ import time
 import numpy as np
 import pytest
 from closed_form import Contact, read_rig
+from equal_stators import in_ring
 from overhung_pump import pump
-from rings import in_ring
 
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.changing_speed.case import record_run_up

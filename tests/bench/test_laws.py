@@ -6,7 +6,7 @@ import time
 import numpy as np
 import pytest
 from closed_form import Contact, read_rig
-from rings import in_ring
+from equal_stators import in_ring
 
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.compilation import seconds_compiling

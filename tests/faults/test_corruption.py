@@ -69,15 +69,12 @@ def check(finished: Path, strikes: list[tuple[int, str, float, int]]) -> None:
         assert Store(store).manifest.damaged_copies(store) == []
 
 
-@settings(max_examples=4, phases=[Phase.generate])  # a failure says all; to shrink it takes minutes
-@given(strikes=st.lists(blows, min_size=1, max_size=3))
-def test_any_damage_is_reported_and_repaired(finished, strikes):
-    check(finished, strikes)
-
-
-@pytest.mark.long
 @pytest.mark.timeout(3600)
-@settings(max_examples=100, phases=[Phase.generate])
-@given(strikes=st.lists(blows, min_size=1, max_size=6))
-def test_any_damage_is_reported_and_repaired_many_times(finished, strikes):
-    check(finished, strikes)
+@pytest.mark.parametrize("n_example", [4, pytest.param(100, marks=pytest.mark.long)])
+def test_any_damage_is_reported_and_repaired(finished, n_example):
+    @settings(max_examples=n_example, phases=[Phase.generate])  # to shrink a failure takes minutes
+    @given(strikes=st.lists(blows, min_size=1, max_size=6))
+    def strike(strikes):
+        check(finished, strikes)
+
+    strike()

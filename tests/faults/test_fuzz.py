@@ -11,6 +11,7 @@ import re
 import tempfile
 import time
 import tomllib
+from collections import Counter
 from contextlib import chdir, redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
@@ -167,24 +168,18 @@ def no_physics() -> Iterator[None]:
     patch.undo()
 
 
-CODES: dict[int, int] = {}
-
-
-@settings(max_examples=30, phases=[Phase.generate])
-@given(pair=PAIRS)
-def test_no_file_breaks_the_program(pair):
-    check(*pair)
-
-
-@pytest.mark.long
 @pytest.mark.timeout(3600)
-@settings(max_examples=3000, phases=[Phase.generate])
-@given(pair=PAIRS)
-def test_no_file_of_thousands_breaks_the_program(pair):
-    code = check(*pair)
-    CODES[code] = CODES.get(code, 0) + 1
-    if sum(CODES.values()) % 1000 == 0:
-        print(f"\n{sum(CODES.values())} spoilt files so far, by exit code: {CODES}")
+@pytest.mark.parametrize("n_example", [30, pytest.param(3000, marks=pytest.mark.long)])
+def test_no_file_breaks_the_program(n_example):
+    codes = Counter()
+
+    @settings(max_examples=n_example, phases=[Phase.generate])
+    @given(pair=PAIRS)
+    def run(pair):
+        codes[check(*pair)] += 1
+
+    run()
+    print(f"\n{codes.total()} spoilt files by exit code: {codes}")
 
 
 @pytest.mark.parametrize(

@@ -86,14 +86,55 @@ samples_per_revolution = 32
 keep = ["section"]
 """
 SLABS = REFINED.replace("coarse = 4", 'coarse = 4\naxes = ["friction"]')
+SLOW = """
+[contact]
+model = "mokhtar2017"
+[integrator]
+method = "central-difference"
+step = "2 us"
+[record]
+transient = 20
+revolutions = 2
+samples_per_revolution = 32
+keep = ["section"]
+"""
+CHAINS = f"""
+rig = "mokhtar2017"
+[grid]
+speed_ratio = {{ values = [0.9, 1.2, 1.6, 2.0], sweep = "both" }}
+clearance_ratio = [0.7, 0.85]
+friction = 0.2
+{SLOW}
+[run]
+block = 1
+"""
+SAMPLE = f"""
+rig = "mokhtar2017"
+[grid]
+speed_ratio = {{ start = 4.0, stop = 5.0 }}
+clearance_ratio = [0.7, 0.85]
+friction = {{ start = 0.05, stop = 0.5, scale = "log" }}
+{SLOW}
+[sample]
+method = "lhs"
+n = 12
+seed = 1
+[run]
+block = 3
+"""
 KINDS = {"branches": BRANCHES, "run_ups": RUN_UPS, "drives": DRIVES, "refined": REFINED, "slabs": SLABS}
+KINDS |= {"chains": CHAINS, "sample": SAMPLE}
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("how", [{"options": ("--workers", "2")}, {"ranks": 2}], ids=["workers", "ranks"])
-@pytest.mark.parametrize("kind", KINDS)
-def test_kills_leave_the_same_bytes(tmp_path, kind, how):
-    options, under = how.get("options", ()), {"ranks": how.get("ranks", 0)}
+@pytest.mark.parametrize(
+    ("kind", "options", "ranks"),
+    [
+        pytest.param(kind, *how, marks=[] if (kind, how[1]) == ("chains", 2) else [pytest.mark.long])
+        for kind in KINDS
+        for how in ((("--workers", "2"), 0), ((), 2))
+    ],
+)
+def test_kills_leave_the_same_bytes(tmp_path, kind, options, ranks):
     whole, study, store = (tmp_path / name for name in ("whole.toml", "killed.toml", "killed.zarr"))
     for path in (whole, study):
         path.write_text(f'title = "killed"\noutput = "{path.with_suffix(".zarr")}"\n{KINDS[kind]}')
@@ -105,7 +146,7 @@ def test_kills_leave_the_same_bytes(tmp_path, kind, how):
     journals = store / ".rubhpc" / "journal"
     for _ in range(3):
         n_before = len(list(journals.glob("*.journal")))
-        job = start(study, *options, **under)
+        job = start(study, *options, ranks=ranks)
         while job.poll() is None and len(list(journals.glob("*.journal"))) == n_before:
             time.sleep(0.02)
         time.sleep(moments.uniform(0.0, 0.2) * taken)  # it computes since a journal of its own is there
@@ -115,6 +156,6 @@ def test_kills_leave_the_same_bytes(tmp_path, kind, how):
         time.sleep(1.0)
         assert not verify(store)
     assert n_killed
-    assert run(study, *options, **under).returncode == 0
+    assert run(study, *options, ranks=ranks).returncode == 0
     assert read_status(store).counts[INFERRED] > 0 or "refine" not in KINDS[kind]
     assert stored_bytes(store) == stored_bytes(tmp_path / "whole.zarr")

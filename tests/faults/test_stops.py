@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 from running import (
+    LAUNCHERS,
+    OWN,
     complaint,
     each_launcher,
     journalled_cases,
-    other_launchers,
     run,
     start,
     wait_for_a_case,
@@ -53,42 +54,32 @@ def complete(study: Path, store: Path, **rest: object) -> None:
 
 
 @pytest.mark.parametrize(
-    ("number", "ranks"),
+    ("number", "ranks", "launcher"),
     [
-        pytest.param(signal.SIGTERM, 0, marks=pytest.mark.long),
-        (signal.SIGTERM, 2),
-        (signal.SIGINT, 0),
-        pytest.param(signal.SIGUSR1, 2, marks=pytest.mark.long),
+        pytest.param(signal.SIGTERM, 0, OWN, marks=pytest.mark.long),
+        (signal.SIGTERM, 2, OWN),
+        (signal.SIGINT, 0, OWN),
+        pytest.param(signal.SIGUSR1, 2, OWN, marks=pytest.mark.long),
+        *((number, 2, one) for one in LAUNCHERS[1:] for number in (signal.SIGTERM, signal.SIGUSR1)),
     ],
 )
-def test_a_signal_stops_a_run(tmp_path, number, ranks):
+def test_a_signal_stops_a_run(tmp_path, number, ranks, launcher):
+    """Open MPI's own mpirun ends with 1 on TERM, whatever its ranks say, and gives them half a second."""
     study, store = write_slow_study(tmp_path, transient=LONG, block=1), tmp_path / "tiny.zarr"
-    job = start(study, ranks=ranks)
+    job = start(study, ranks=ranks, launcher=launcher)
     wait_for_a_case(job, store)
     job.send_signal(number)
-    assert number.name in ended_early(job)
-    assert journalled_cases(store) > 0
-    assert Store(store).is_packed()
-    with Store(store).lock():  # it is free
-        pass
-    complete(study, store, ranks=ranks)
-
-
-@other_launchers
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGUSR1])
-def test_a_signal_under_any_launcher_loses_nothing(tmp_path, launcher, number):
-    """The program's own launcher is in the test above, too.
-
-    Open MPI's own mpirun ends with 1 on TERM, whatever its ranks say, and gives them half a second.
-    """
-    study, store = write_slow_study(tmp_path, transient=LONG, block=1), tmp_path / "tiny.zarr"
-    job = start(study, ranks=2, launcher=launcher)
-    wait_for_a_case(job, store)
-    job.send_signal(number)
-    _, err = job.communicate(timeout=10)
-    assert job.returncode == 75 or (launcher.is_open_mpi and number == signal.SIGTERM and job.returncode)
-    assert "Traceback" not in err
-    complete(study, store, ranks=2, launcher=launcher)
+    if launcher.is_open_mpi and number == signal.SIGTERM:
+        _, err = job.communicate(timeout=10)
+        assert job.returncode
+        assert "Traceback" not in err
+    else:
+        assert number.name in ended_early(job)
+        assert journalled_cases(store) > 0
+        assert Store(store).is_packed()
+        with Store(store).lock():  # it is free
+            pass
+    complete(study, store, ranks=ranks, launcher=launcher)
 
 
 @each_launcher

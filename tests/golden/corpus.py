@@ -16,8 +16,8 @@ import numpy as np
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
+from equal_stators import in_ring
 from overhung_pump import SEGMENT, pump
-from rings import in_ring
 from trial_rig import STEEL, trial_rig
 
 import rubhpc

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from closed_form import Contact, simulate
-from rings import in_ring
+from equal_stators import in_ring
 from trial_rig import trial_rig
 
 from rubhpc import LumpedStator

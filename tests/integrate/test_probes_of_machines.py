@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 from closed_form import simulate
+from equal_stators import in_ring
 from overhung_pump import SEGMENT, pump
-from rings import in_ring
 from trial_rig import STEEL, trial_rig
 
 from rubhpc import LumpedStator, Probe, Rig, Unbalance

@@ -17,7 +17,6 @@ from running import (
     start,
     stored_bytes,
     wait_for_a_case,
-    write_sample,
     write_slow_study,
     write_study,
 )
@@ -76,25 +75,6 @@ def test_a_resumed_run_of_other_size_stores_equal_bytes(tmp_path, alone):
     assert done.returncode == 0, done.stderr
     assert journalled_cases(store) == 12  # none was computed twice
     assert stored_bytes(store) == alone
-
-
-def test_a_sample_killed_on_its_way_and_resumed_on_two_ranks_stores_equal_bytes(tmp_path):
-    """Ranges of speed and friction, and a list of clearances: each row of the sample has its own set-up."""
-    slow = {"integrator": 'method = "central-difference"\nstep = "2 us"', "block": 3, "revolutions": 4}
-    slow["speed_ratio"] = "{ start = 4.0, stop = 5.0 }"
-    slow["run"] = '[sample]\nmethod = "lhs"\nn = 8\nseed = 1'
-    study, store, whole = write_sample(tmp_path, **slow), tmp_path / "tiny.zarr", tmp_path / "whole.zarr"
-    assert run(study, "--output", whole).returncode == 0
-    job = start(study, ranks=2)
-    wait_for_a_case(job, store)
-    job.kill()
-    job.communicate(timeout=60)
-    for process in processes_of(store).values():
-        process.wait(5)
-    assert 0 < journalled_cases(store) < 16
-    done = run(study, ranks=2)
-    assert done.returncode == 0, done.stderr
-    assert stored_bytes(store) == stored_bytes(whole)
 
 
 def test_no_rank_outlives_the_daemon_that_started_it(tmp_path):

@@ -110,6 +110,8 @@ def check_arrays(study: Study) -> None:
     dataset = xr.open_zarr(RegularFiles(study.output)).load()
     for axis in study.axes:
         assert tuple(dataset[axis.dimension].values) == axis.values
+        assert dataset.attrs["study"]["grid"][axis.name]["values"] == list(axis.values)
+    assert dataset.spin_speed.shape == (len(study.axes[0].values),)
     for index in np.ndindex(dataset.status.shape):
         point = [axis.values[i] for axis, i in zip(study.axes, index, strict=True)]
         status = int(dataset.status.values[index])
@@ -137,30 +139,21 @@ def growths(draw: st.DrawFn) -> list[dict[str, list[float]]]:
     return grids
 
 
-@settings(max_examples=2, phases=[Phase.generate])
-@given(
-    grids=growths(),
-    block=st.integers(1, 7),
-    kills=st.lists(st.integers(0, 130), max_size=2),
-    is_sharded=st.booleans(),
-)
-def test_growth_in_any_order_keeps_every_case_though_it_is_killed(grids, block, kills, is_sharded):
-    with shards() if is_sharded else nullcontext():
-        grow_and_kill(grids, block, kills)
-
-
-@pytest.mark.long
 @pytest.mark.timeout(3600)
-@settings(max_examples=60, phases=[Phase.generate])
-@given(
-    grids=growths(),
-    block=st.integers(1, 7),
-    kills=st.lists(st.integers(0, 130), max_size=4),
-    is_sharded=st.booleans(),
-)
-def test_growth_in_any_order_keeps_every_case_many_times(grids, block, kills, is_sharded):
-    with shards() if is_sharded else nullcontext():
-        grow_and_kill(grids, block, kills)
+@pytest.mark.parametrize(("n_example", "most_kills"), [(2, 2), pytest.param(60, 4, marks=pytest.mark.long)])
+def test_growth_in_any_order_keeps_every_case_though_it_is_killed(n_example, most_kills):
+    @settings(max_examples=n_example, phases=[Phase.generate])
+    @given(
+        grids=growths(),
+        block=st.integers(1, 7),
+        kills=st.lists(st.integers(0, 130), max_size=most_kills),
+        is_sharded=st.booleans(),
+    )
+    def grow(grids, block, kills, is_sharded):
+        with shards() if is_sharded else nullcontext():
+            grow_and_kill(grids, block, kills)
+
+    grow()
 
 
 def grow_and_kill(grids: list[dict[str, list[float]]], block: int, kills: list[int]) -> None:

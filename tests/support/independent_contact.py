@@ -34,7 +34,7 @@ IMPACT = 1e-7  # s, for which the forces of closed pairs resist what the impact 
 UNSEEN = 1e-15  # m, an overlap that is no touch yet
 
 
-def solve(rig, case, longest_step=0.1e-6, **start):
+def solve(rig, case, longest_step=0.1e-6):
     """Return samples and measures of a case by their names in a record, and `error` of each.
 
     Parameters
@@ -45,7 +45,7 @@ def solve(rig, case, longest_step=0.1e-6, **start):
     longest_step : float
         s, of contact, in the coarser of two runs.
     """
-    coarse, fine = (run(rig, case, step, **start) for step in (longest_step, longest_step / 2))
+    coarse, fine = (run(rig, case, step) for step in (longest_step, longest_step / 2))
     error = {}
     for name in fine:
         size = np.abs(fine[name]).max(initial=0.0)
@@ -53,7 +53,7 @@ def solve(rig, case, longest_step=0.1e-6, **start):
     return fine | {"error": error}
 
 
-def run(rig, case, longest_step, **start):
+def run(rig, case, longest_step):
     """Return samples and measures with one step, which is at most `longest_step` (s) in contact."""
     spin = case["speed"] if "speed" in case else case["speed_ratio"] * first_lateral_frequency(rig)
     bodies = set_up(rig, spin)
@@ -61,8 +61,8 @@ def run(rig, case, longest_step, **start):
     radius = np.array([rig.contact_radius(stator) for stator in rig.stator])
     angle = np.array([stator.angle for stator in rig.stator])
     clearance = case["clearance"] + np.array(offset)
-    is_bore = np.array([stator.is_bore for stator in rig.stator])
-    return march_bodies(bodies, spin, case, radius, angle, clearance, longest_step, is_bore=is_bore, **start)
+    roundness = np.where([stator.is_bore for stator in rig.stator], -clearance, radius)
+    return march_bodies(bodies, spin, case, radius, angle, clearance, roundness, longest_step)
 
 
 def first_lateral_frequency(rig):
@@ -96,15 +96,14 @@ def pair_rows(bodies, radius, angle):
     return rows
 
 
-def march_bodies(bodies, spin, case, radius, angle, clearance, longest_step, start=None, is_bore=None):
-    """March from equilibrium, or from `start` (2, n) of displacements and velocities, and measure."""
+def march_bodies(bodies, spin, case, radius, angle, clearance, roundness, longest_step):
+    """March from equilibrium, and measure."""
     n, q = len(bodies.mass), len(radius)
     revolutions, per_revolution = case["revolutions"], case.get("samples_per_revolution", 64)
     n_sample = revolutions * per_revolution
     interval = 2 * math.pi / abs(spin) / per_revolution
     halved = max(2, math.ceil(math.log2(interval / longest_step)))  # intervals, to steps of contact
     lengths = interval / 2.0 ** np.arange(halved + FINEST, -1, -1)
-    roundness = radius if is_bore is None else np.where(is_bore, -clearance, radius)
     laws, table = read_laws(case, fade=lengths[FINEST] / 2)
 
     inverse = np.linalg.inv(bodies.mass)
@@ -120,9 +119,7 @@ def march_bodies(bodies, spin, case, radius, angle, clearance, longest_step, sta
     rows = pair_rows(bodies, radius, angle)
     m = rows.shape[1]
     sag, still = at_rest(bodies, rows, roundness, clearance, laws)
-    first = np.array([still, np.zeros(n)]) if start is None else np.array(start)
-    first[0] -= sag
-    z = enter @ (first.ravel() - whirl.real)
+    z = enter @ (np.concatenate([still - sag, np.zeros(n)]) - whirl.real)
 
     rows = rows.reshape(q * m, n)
     load = enter[:, n:] @ inverse @ rows.T  # rates of the modes from loads on the motions of pairs
@@ -143,7 +140,7 @@ def march_bodies(bodies, spin, case, radius, angle, clearance, longest_step, sta
     steady = np.array([rows @ whirl[:n], rows @ sag, rows @ whirl[n:]])
     bins, states = np.zeros((q, n_sample * 2**halved)), np.zeros((n_sample + 1, 2 * len(exponent)))
     late = np.zeros(bins.shape, np.float32)  # how far into its bin an impulse is
-    sums = np.zeros((6, q))
+    sums = np.zeros((4, q))
     converged = march(
         np.concatenate([z.real, z.imag]),
         (states, bins, late, sums),
@@ -156,12 +153,9 @@ def march_bodies(bodies, spin, case, radius, angle, clearance, longest_step, sta
     assert converged, "the contact problem did not converge"
     turns = np.exp(1j * np.sign(spin) * 2 * math.pi * np.arange(n_sample + 1) / per_revolution)
     motion = states @ real(shape).T + np.outer(turns, whirl).real
-    u, v = motion[:, :n], motion[:, n:]
-    symmetric = (bodies.stiffness + bodies.stiffness.T) / 2
-    energy = 0.5 * ((u @ symmetric * u).sum(axis=1) + (v @ bodies.mass * v).sum(axis=1))
     of = np.concatenate([bodies.output, *bodies.rows[:, 3:].T])
-    signals = np.where(of >= 0, (u + sag)[:-1, of], 0.0).T
-    contact, stick, friction, normal, both, contacts = sums
+    signals = np.where(of >= 0, (motion[:, :n] + sag)[:-1, of], 0.0).T
+    contact, stick, friction, contacts = sums
     return {
         "vertical": signals[0],
         "horizontal": signals[1],
@@ -175,9 +169,6 @@ def march_bodies(bodies, spin, case, radius, angle, clearance, longest_step, sta
         "stick_fraction": stick / np.maximum(contact, 1e-300),
         "friction_work": friction / revolutions,
         "contacts_per_revolution": contacts / revolutions,
-        "normal_work": normal,
-        "contact_work": both,
-        "energy": energy,
     }
 
 
@@ -447,11 +438,9 @@ def march(y, kept, tables, given, grid, laws, table):
                     sums[0, i] += dt
                     sums[1, i] += dt * (found[i] == STUCK)
                     sums[2, i] += tangent[i] * (given[2][i] * dt - t_dir[i] @ gone[i])
-                    sums[3, i] += normal[i] * (n_dir[i] @ gone[i])
-                    sums[4, i] += load[i] @ gone[i]
         t += 2**level
         for i in range(q):
-            sums[5, i] += found[i] != OPEN and state[i] == OPEN and t - left[i] >= SHORTEST
+            sums[3, i] += found[i] != OPEN and state[i] == OPEN and t - left[i] >= SHORTEST
             left[i] = t if found[i] == OPEN and state[i] != OPEN else left[i]
         held[0], held[1], state[:] = normal, tangent, found
         if not np.any(hit):
@@ -500,9 +489,7 @@ def march(y, kept, tables, given, grid, laws, table):
                     late[i, here] = t / 2**FINEST - here
                 bins[i, here] += normal[i]
                 sums[2, i] += tangent[i] * (given[2][i] - t_dir[i] @ mean)
-                sums[3, i] += normal[i] * (n_dir[i] @ mean)
-                sums[4, i] += load[i] @ mean
-                sums[5, i] += hit[i] and t - left[i] >= SHORTEST
+                sums[3, i] += hit[i] and t - left[i] >= SHORTEST
                 drift = 0.0 if hit[i] else max(n_dir[i] @ v[i], 0.0)
                 stays = n_dir[i] @ after[i] - drift <= REST * hardest
                 state[i] = (found[i] or max(state[i], FORWARD)) if stays else OPEN

@@ -4,8 +4,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from equal_stators import in_ring
 from random_rigs import PACKAGED
-from rings import in_ring
 
 from rubhpc.rig.reading import with_keys
 from rubhpc.rig.rig import Rig

@@ -12,8 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import block_diag
 
-PER_PAIR = 5  # degrees of a contact pair: disc v, w, torsion; tip axial, lateral
-
 
 def beam_element(length, flexural_rigidity, shear_rigidity, mass, rotary_inertia):
     """Translational mass, rotary mass and stiffness, (4, 4), of deflection and rotation at both ends.

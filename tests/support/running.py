@@ -204,13 +204,6 @@ def _launchers() -> list[Launcher]:
 
 LAUNCHERS = _launchers()
 OWN = LAUNCHERS[0]  # the one that comes with the program
-other_launchers = pytest.mark.parametrize(
-    "launcher",
-    [
-        pytest.param(launcher, id=launcher.name, marks=[pytest.mark.long] if launcher is OWN else [])
-        for launcher in LAUNCHERS
-    ],
-)
 each_launcher = pytest.mark.parametrize("launcher", LAUNCHERS, ids=lambda launcher: launcher.name)
 
 

@@ -7,8 +7,8 @@ from functools import partial
 import numpy as np
 import pytest
 from closed_form import Contact, read_rig, simulate
+from equal_stators import in_ring
 from lone_bodies import body, set_up, set_up_modal, tip
-from rings import in_ring
 
 from rubhpc import State
 from rubhpc.integrate.case import run_case

@@ -2,7 +2,7 @@
 
 import numpy as np
 from closed_form import run_up
-from rings import in_ring
+from equal_stators import in_ring
 from trial_rig import trial_rig
 
 from rubhpc.integrate.changing_speed import speed_ranges

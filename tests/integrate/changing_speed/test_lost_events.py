@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 from closed_form import Contact, read_rig, run_up
+from equal_stators import in_ring
 from overhung_pump import pump
-from rings import in_ring
 
 from rubhpc.integrate.changing_speed import passing
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch

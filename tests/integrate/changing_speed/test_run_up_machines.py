@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 from closed_form import run_up
+from equal_stators import in_ring
 from overhung_pump import pump
-from rings import in_ring
 
 from rubhpc import Probe
 from rubhpc.fem.assemble import assemble

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from closed_form import Contact
+from equal_stators import in_ring
 from overhung_pump import pump
-from rings import in_ring
 from test_steep_run_ups import machine
 
 from rubhpc.integrate.changing_speed import range_library

@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 from closed_form import read_rig, run_up, simulate
-from rings import in_ring
+from equal_stators import in_ring
 
 from rubhpc.integrate.marches import event_driven
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from closed_form import read_rig, simulate
 from contact_answers import masses
+from equal_stators import in_ring
 from independent_contact import run
 from record_distance import MOTIONS
 from reference_bodies import squared_slope
-from rings import in_ring
 from trial_rig import trial_rig
 
 import rubhpc
@@ -25,7 +25,6 @@ from rubhpc.integrate.scheme import Scheme
 from rubhpc.recent import forget
 from rubhpc.rig.reading import with_keys
 from rubhpc.rig.stators import LumpedStator, MatrixStator
-from rubhpc.schema import SCHEMES
 
 RUB = {"speed": 170.0, "clearance": "80 um", "friction": 0.2, "transient": 0, "revolutions": 2}
 CLOSE = RUB | {"clearance": "40 um"}
@@ -228,7 +227,7 @@ BOUNCING += ("sliding, ring of 16", "sliding, carried", "sliding, pump in 8", "r
 def test_a_fixed_normal_is_that_of_the_closed_form(name):
     """Laws that have one, on every machine; bounces within a share of a contact may be counted otherwise."""
     found, known = both(name, accuracy=1e-4)
-    assert (SCHEMES[found.scheme], SCHEMES[known.scheme]) == ("collocation", "event_driven")
+    assert found.steps != known.steps  # of two marches
     assert known.contact_impulse.any()
     for signal in (*MOTIONS, "contact_force"):
         one, other = found.signals[signal], known.signals[signal]

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from closed_form import Contact, read_rig, simulate
+from equal_stators import in_ring
 from record_distance import MOTIONS
-from rings import in_ring
 from trial_rig import trial_rig, turn
 
 from rubhpc import State

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from closed_form import periodic, read_rig, simulate
-from rings import in_ring
+from equal_stators import in_ring
 
 from rubhpc.errors import NoPeriodicMotion
 from rubhpc.integrate import periodic_motion

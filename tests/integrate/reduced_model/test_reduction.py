@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from closed_form import read_rig
-from rings import in_ring
+from equal_stators import in_ring
 from scipy.linalg import block_diag, eigvals
 from trial_rig import trial_rig
 
