@@ -14,11 +14,11 @@ import time
 from pathlib import Path
 
 import numpy as np
-from closed_form import Contact
 
 TESTS = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(TESTS / "integrate" / "changing_speed"), str(TESTS / "support")]
 
+from set_ups import prepared  # noqa: E402
 from test_steep_run_ups import (  # noqa: E402
     PER_REVOLUTION,
     PROBES,
@@ -31,10 +31,9 @@ from test_steep_run_ups import (  # noqa: E402
 
 from rubhpc.integrate.case import run_case  # noqa: E402
 from rubhpc.integrate.changing_speed.case import record_run_up  # noqa: E402
-from rubhpc.integrate.setup import prepare  # noqa: E402
 from rubhpc.study.initial import CONTACT_FREE, Initial  # noqa: E402
 from rubhpc.study.speed_law import SpeedLaw  # noqa: E402
-from rubhpc.study.study import Integrator, Recording  # noqa: E402
+from rubhpc.study.study import Recording  # noqa: E402
 from rubhpc.threads import on_one_thread  # noqa: E402
 
 STEADY = 5  # constant speeds
@@ -50,9 +49,7 @@ LAWS = {
 
 def seconds_of(integrate, speed, recording, *law):
     """Processor time of the first case of a set-up."""
-    setup = prepare(
-        machine(8), speed, contact=Contact(), integrator=Integrator(), samples_per_revolution=PER_REVOLUTION
-    )
+    setup = prepared(machine(8), speed, samples=PER_REVOLUTION)
     began = time.process_time()
     integrate(setup, *law, recording=recording, initial=Initial(from_=CONTACT_FREE), **RUB)
     return time.process_time() - began

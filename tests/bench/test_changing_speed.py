@@ -8,13 +8,13 @@ import pytest
 from closed_form import Contact, read_rig
 from equal_stators import in_ring
 from overhung_pump import pump
+from set_ups import prepared
 
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.changing_speed.case import record_run_up
-from rubhpc.integrate.setup import prepare
 from rubhpc.study.initial import CONTACT_FREE, Initial
 from rubhpc.study.speed_law import SpeedLaw
-from rubhpc.study.study import Integrator, Recording
+from rubhpc.study.study import Recording
 from rubhpc.threads import on_one_thread
 
 pytestmark = pytest.mark.bench
@@ -30,7 +30,7 @@ REPEATED = 4
 
 def setup_at(law, speed, rig=None):
     rig, contact = rig or read_rig("mokhtar2017"), Contact(**law)
-    return prepare(rig, speed, contact=contact, integrator=Integrator(), samples_per_revolution=SAMPLES)
+    return prepared(rig, speed, samples=SAMPLES, contact=contact)
 
 
 def seconds_of(integrate, setup, recording, *law, case=CASE):

@@ -5,14 +5,14 @@ import time
 
 import numpy as np
 import pytest
-from closed_form import Contact, read_rig
+from closed_form import read_rig
 from equal_stators import in_ring
+from set_ups import prepared
 
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.compilation import seconds_compiling
-from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import with_keys
-from rubhpc.study.study import Integrator, Recording
+from rubhpc.study.study import Recording
 from rubhpc.threads import on_one_thread
 
 pytestmark = pytest.mark.bench
@@ -55,13 +55,7 @@ def seconds_of(rig, cases, friction, law, first=FIRST):
     if "geometry" in law:
         rig = with_keys(rig, {"stator.geometry": law.pop("geometry")})
     for ratio, clearance in cases:
-        setup = prepare(
-            rig,
-            ratio * FREQUENCY,
-            contact=Contact(**law),
-            integrator=Integrator(),
-            samples_per_revolution=SAMPLES,
-        )
+        setup = prepared(rig, ratio * FREQUENCY, samples=SAMPLES, **law)
         run_case(setup, clearance=clearance, friction=friction, recording=first)
         compiled = math.nan
         while compiled != seconds_compiling():  # what only some cases need is compiled by the first of them

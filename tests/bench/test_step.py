@@ -1,11 +1,11 @@
 """Time of a step. One core is meant; on a busy machine the least of several rounds counts."""
 
 import pytest
-from closed_form import Contact, read_rig
+from closed_form import read_rig
+from set_ups import prepared
 
 from rubhpc.integrate.case import run_case
-from rubhpc.integrate.setup import prepare
-from rubhpc.study.study import Integrator, Recording
+from rubhpc.study.study import Recording
 
 pytestmark = pytest.mark.bench
 
@@ -13,12 +13,8 @@ pytestmark = pytest.mark.bench
 @pytest.mark.parametrize("normal", ["fixed", "updated"])
 def test_step_of_the_packaged_rig_takes_two_microseconds(benchmark, normal):
     """Central difference at the paper's step, rubbing, all of it recorded."""
-    setup = prepare(
-        read_rig("mokhtar2017"),
-        148.7,
-        contact=Contact(normal=normal),
-        integrator=Integrator(method="central-difference", step=0.5e-6),
-        samples_per_revolution=256,
+    setup = prepared(
+        read_rig("mokhtar2017"), 148.7, samples=256, method="central-difference", step=0.5e-6, normal=normal
     )
     recording = Recording(transient=0, revolutions=3, keep=())
 

@@ -7,18 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from closed_form import Contact, read_rig, simulate
+from closed_form import read_rig, simulate
 from rivals import STEP
 from rivals import run as run_rival
+from set_ups import prepared
 
 import rubhpc
 from rubhpc.integrate import case as case_module
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.marches import event_driven as event_driven_march
 from rubhpc.integrate.periodic_motions import saltation
-from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import with_keys
-from rubhpc.study.study import Integrator, Recording
+from rubhpc.study.study import Recording
 
 pytestmark = pytest.mark.bench
 
@@ -34,13 +34,7 @@ MAP = Path(__file__).parents[2] / "jobs" / "map.toml"
 
 
 def set_up(rig, speed, **integrator):
-    return prepare(
-        rig,
-        speed,
-        contact=Contact(),
-        integrator=Integrator(**integrator),
-        samples_per_revolution=PER_REVOLUTION,
-    )
+    return prepared(rig, speed, samples=PER_REVOLUTION, **integrator)
 
 
 def least(function, rounds):

@@ -4,14 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from closed_form import Contact, simulate
+from closed_form import simulate
 from equal_stators import in_ring
+from set_ups import prepared
 from trial_rig import trial_rig
 
 from rubhpc import LumpedStator
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
-from rubhpc.integrate.setup import prepare
-from rubhpc.study.study import Integrator
 
 SPEED, CLEARANCE, FRICTION, N_REVOLUTION = 170.0, 80e-6, 0.2, 6
 LAWS = [{}, {"restitution": 0.5}]
@@ -26,7 +25,7 @@ def motion_of(rig, law):
     """What follows a case from its end."""
     given = {"clearance": CLEARANCE, "friction": FRICTION, "samples_per_revolution": 64, "keep": ()}
     final = simulate(rig, speed=SPEED, transient=5, revolutions=1, **given, **law).final
-    setup = prepare(rig, SPEED, contact=Contact(**law), integrator=Integrator(), samples_per_revolution=64)
+    setup = prepared(rig, SPEED, **law)
     return PiecewiseMotion(setup, CLEARANCE, FRICTION, final)
 
 

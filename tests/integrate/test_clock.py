@@ -3,22 +3,15 @@
 import math
 
 import pytest
-from closed_form import Contact, read_rig, simulate
+from closed_form import read_rig, simulate
+from set_ups import prepared
 
 from rubhpc import InputError
 from rubhpc.integrate.modal_setup import CONTACT_STEPS, FINEST_TICK, LONGEST_TURN
-from rubhpc.integrate.setup import prepare
-from rubhpc.study.study import Integrator
 
 
 def clock(speed: float, samples: int):
-    setup = prepare(
-        read_rig("mokhtar2017"),
-        speed,
-        contact=Contact(),
-        integrator=Integrator(),
-        samples_per_revolution=samples,
-    )
+    setup = prepared(read_rig("mokhtar2017"), speed, samples=samples)
     return setup.clock
 
 

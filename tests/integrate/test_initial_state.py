@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from closed_form import Contact, read_rig, simulate
 from record_distance import MOTIONS
+from set_ups import prepared
 from trial_rig import trial_rig
 
 from rubhpc import LumpedStator
@@ -147,7 +148,7 @@ def test_two_runs_that_meet_amid_a_contact_are_one(law):
 
 def test_what_a_penalty_overlaps_stays_and_what_a_wall_adds_goes():
     contact = Contact(law="penalty", stiffness=1e6, damping=10.0)
-    setup = prepare(trial_rig(1), SPIN, contact=contact, integrator=Integrator(), samples_per_revolution=64)
+    setup = prepared(trial_rig(1), SPIN, contact=contact)
     overlapped = None
     for n in range(20):  # until a revolution ends in contact
         state = settled(setup, (30 + n) * 1e-6, overlapped)
@@ -183,13 +184,7 @@ def test_a_shaft_rests_on_the_walls_that_its_sag_overlaps(friction_law):
     walls = tuple(LumpedStator(node=8, angle=0.55 + i * math.pi / 4.0, rigid=True) for i in range(8))
     packaged = read_rig("mokhtar2017")
     rig = replace(packaged, rotor=replace(packaged.rotor, gravity=9.81), stator=walls)
-    setup = prepare(
-        rig,
-        SPIN,
-        contact=Contact(friction_law=friction_law),
-        integrator=Integrator(),
-        samples_per_revolution=SHORT.samples_per_revolution,
-    )
+    setup = prepared(rig, SPIN, samples=SHORT.samples_per_revolution, friction_law=friction_law)
     clearance = 5e-6
     over, _ = gaps(State.at_rest(setup.model).displacement, setup, clearance)
     state = at_rest(setup, clearance)

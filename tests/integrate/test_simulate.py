@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from closed_form import Contact, read_rig, simulate
+from closed_form import read_rig, simulate
+from set_ups import prepared
 
 import rubhpc
 from rubhpc import InputError, State
@@ -14,11 +15,10 @@ from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency, step_limit
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.marches import march
-from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import PACKAGED, with_keys
 from rubhpc.schema import DONE, SECTION_NAMES, SIGNAL_NAMES, VARIABLES
 from rubhpc.spectra import amplitude_spectrum
-from rubhpc.study.study import Integrator, Recording
+from rubhpc.study.study import Recording
 
 RIG = read_rig("mokhtar2017")
 MODEL = assemble(RIG)
@@ -137,13 +137,7 @@ def test_step_above_the_limit_is_refused_with_the_limit(modulus):
 @pytest.mark.parametrize(("modulus", "expected"), [(3e9, 0.5e-6), (300e9, None)])
 def test_step_left_open_is_the_papers_or_a_share_of_the_limit(modulus, expected):
     rig = with_keys(RIG, {"stator.youngs_modulus": modulus})
-    setup = prepare(
-        rig,
-        SPEED,
-        contact=Contact(),
-        integrator=Integrator(method="central-difference"),
-        samples_per_revolution=256,
-    )
+    setup = prepared(rig, SPEED, samples=256, method="central-difference")
     wanted = expected or 0.9 * step_limit(setup.model)
     assert 0.99 * wanted < setup.step <= wanted
     assert setup.step * setup.steps_per_sample * 256 == pytest.approx(2 * math.pi / SPEED, rel=1e-14)
@@ -201,13 +195,7 @@ def test_transient_is_run_but_not_recorded():
 
 
 def run(*, rig=RIG, normal="fixed", change=lambda setup: setup, **options):
-    setup = prepare(
-        rig,
-        SPEED,
-        contact=Contact(normal=normal),
-        integrator=Integrator(method="central-difference", step=2e-6),
-        samples_per_revolution=256,
-    )
+    setup = prepared(rig, SPEED, samples=256, method="central-difference", step=2e-6, normal=normal)
     recording = Recording(transient=1, revolutions=2)
     return run_case(
         change(setup), **({"clearance": 60e-6, "friction": 0.3, "recording": recording} | options)

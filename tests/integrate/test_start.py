@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from closed_form import Contact, simulate
+from set_ups import prepared
 from trial_rig import trial_rig
 
 from rubhpc import Bore, read_rig
@@ -45,9 +46,7 @@ def test_the_contact_free_motion_needs_no_transient(speed):
 
 
 def prepare_model(speed: float):
-    return prepare(
-        trial_rig(1), speed, contact=Contact(), integrator=Integrator(), samples_per_revolution=64
-    ).model
+    return prepared(trial_rig(1), speed).model
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -5,14 +5,13 @@ import math
 import numpy as np
 import pytest
 from calling import interpreted
-from closed_form import Contact
 from scipy.integrate import quad
 from scipy.linalg import expm
+from set_ups import prepared
 from trial_rig import trial_rig
 
 from rubhpc import State
 from rubhpc.integrate.marches.collocation import CollocationMarch
-from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.collocation import equations, events, gaps, impacts, motions, newton, tables
 from rubhpc.kernels.collocation.structures import (
     ACROSS,
@@ -28,7 +27,6 @@ from rubhpc.kernels.collocation.structures import (
     TWIST,
     lobatto_nodes,
 )
-from rubhpc.study.study import Integrator
 
 SPEED, CLEARANCE, FRICTION_RATIO = 170.0, 40e-6, 0.3
 EVERY_S = pytest.mark.parametrize("s", [4, 5])
@@ -42,13 +40,7 @@ HERTZ = {"law": "hertz", "stiffness": 1e9, "damping": 2.0}
 
 def march_of(n_stator=1, *, geometry="linear", accuracy=1e-3, **contact):
     """A march at rest, and its pairs."""
-    setup = prepare(
-        trial_rig(n_stator, geometry=geometry, cross=1e5),
-        SPEED,
-        contact=Contact(**contact),
-        integrator=Integrator(accuracy=accuracy),
-        samples_per_revolution=64,
-    )
+    setup = prepared(trial_rig(n_stator, geometry=geometry, cross=1e5), SPEED, accuracy=accuracy, **contact)
     march = CollocationMarch(setup, CLEARANCE, FRICTION_RATIO, State.at_rest(setup.model), None)
     return march, march._contacts
 

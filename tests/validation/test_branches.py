@@ -5,16 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from closed_form import Contact, branch, periodic, read_rig
+from closed_form import branch, periodic, read_rig
+from set_ups import prepared
 
 from rubhpc import LumpedStator, Rig, Unbalance
 from rubhpc.integrate.branches.arclength import follow
 from rubhpc.integrate.branches.branching import Branching
 from rubhpc.integrate.branches.events import Event
 from rubhpc.integrate.periodic_motions.family import Family
-from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import with_keys
-from rubhpc.study.study import Integrator
 
 
 class CrossCoupled(Family):
@@ -32,9 +31,7 @@ class CrossCoupled(Family):
                 stators=[LumpedStator(node=1, rigid=True, radius=1.0)],
                 unbalance=[Unbalance(node=1, mass=1.0, radius=1.0)],
             )  # fmt: skip
-            self._known[value] = prepare(
-                rig, 2.0, contact=Contact(), integrator=Integrator(step=1e-3), samples_per_revolution=64
-            )
+            self._known[value] = prepared(rig, 2.0, step=1e-3)
         return self._known[value], 100.0, 0.0
 
 

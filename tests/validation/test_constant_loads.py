@@ -7,18 +7,18 @@ import numpy as np
 import pytest
 from closed_form import Contact, read_rig, simulate
 from lone_bodies import body, set_up, set_up_modal, tip
+from set_ups import prepared
 
 from rubhpc import Carrier, InputError, Load, LumpedStator, MatrixStator, Rig, assemble
 from rubhpc.fem.assemble import model_at
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.record import State
-from rubhpc.integrate.setup import prepare
 from rubhpc.integrate.start import at_rest
 from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.rig.parts import Bearing, ShaftSection
 from rubhpc.rig.reading import with_keys
 from rubhpc.rig.rotors import Rotor
-from rubhpc.study.study import Integrator, Recording
+from rubhpc.study.study import Recording
 
 G = 9.81  # m/s2
 FAST = 50 * math.pi  # rad/s, 1500 rpm
@@ -174,9 +174,7 @@ def test_rest_with_circulation_solves_the_static_equations():
     opens[rotor.index(8, "v")], opens[n + stator.axial] = 1.0, 1.0
     system[:-1, -1], system[-1, :-1] = -opens, opens
     load[:n], load[-1] = model.load, -1.5e-4
-    setup = prepare(
-        crossed(ON_STATOR), FAST, contact=Contact(), integrator=Integrator(), samples_per_revolution=256
-    )
+    setup = prepared(crossed(ON_STATOR), FAST, samples=256)
     known, rest = np.linalg.solve(system, load), at_rest(setup, 1.5e-4)
     assert rest.contact_force == pytest.approx(known[-1:], rel=1e-6)
     at = [rotor.index(8, name) for name in ("v", "w")]

@@ -5,17 +5,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from closed_form import Contact, read_rig
+from closed_form import read_rig
 from scipy.linalg import eigh
+from set_ups import prepared
 
 from rubhpc import State
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.packing import pack
 from rubhpc.integrate.reduced_model.reduction import reduce_model
-from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.force_average import AVERAGING_TIME
 from rubhpc.rig.reading import with_keys
-from rubhpc.study.study import Integrator, Recording
+from rubhpc.study.study import Recording
 
 STILL = {
     "rotor.damping.alpha": 0.0,
@@ -32,13 +32,7 @@ def every_step(duration, step):
 def set_up_at_rest(rig, method, duration, step):
     """A shaft that does not turn: the speed only sets how long a revolution of samples lasts."""
     per_revolution = every_step(duration, step)
-    setup = prepare(
-        rig,
-        2 * math.pi / duration,
-        contact=Contact(),
-        integrator=Integrator(method=method, step=step * 1.000001),
-        samples_per_revolution=per_revolution,
-    )
+    setup = prepared(rig, 2 * math.pi / duration, samples=per_revolution, method=method, step=step * 1.000001)
     if method == "modal":
         return replace(setup, reduced=reduce_model(setup.model, 0.0, 1e-3))
     assert setup.steps_per_sample == 1

@@ -4,23 +4,20 @@ import math
 
 import numpy as np
 import pytest
-from closed_form import Contact, read_rig, run_up
+from closed_form import read_rig, run_up
 from equal_stators import in_ring
 from overhung_pump import pump
+from set_ups import prepared
 
 from rubhpc.integrate.changing_speed import passing
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.record import State
-from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import with_keys
-from rubhpc.study.study import Integrator
 
 
 @pytest.mark.parametrize("overlap", [-1e-6, 1e-6])
 def test_an_open_pair_that_overlaps_has_missed_an_event(monkeypatch, overlap):
-    setup = prepare(
-        read_rig("mokhtar2017"), 200.0, contact=Contact(), integrator=Integrator(), samples_per_revolution=64
-    )
+    setup = prepared(read_rig("mokhtar2017"), 200.0)
     march = EventDrivenMarch(setup, 1e-4, 0.2, State.at_rest(setup.model), None)
     jacobian, motion = march.bodies.gap_jacobian[0], march.motion()
     n = jacobian.size

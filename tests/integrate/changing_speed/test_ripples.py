@@ -5,16 +5,16 @@ import re
 
 import numpy as np
 import pytest
-from closed_form import Contact, run_up
+from closed_form import run_up
+from set_ups import prepared
 from test_steep_run_ups import PROBES, machine
 
 from rubhpc.integrate.changing_speed import ripples
 from rubhpc.integrate.changing_speed.case import record_run_up
 from rubhpc.integrate.changing_speed.ripples import Linear, Ripples
-from rubhpc.integrate.setup import prepare
 from rubhpc.study.initial import CONTACT_FREE, Initial
 from rubhpc.study.speed_law import LAG, SpeedLaw, cut
-from rubhpc.study.study import Integrator, Recording
+from rubhpc.study.study import Recording
 
 NATURAL, DAMPING = 200.0, 0.02  # rad/s, of critical
 
@@ -83,9 +83,7 @@ def test_a_run_up_in_too_few_pieces_says_so():
 def test_a_case_of_a_study_says_so(monkeypatch):
     """36 samples a revolution can be cut into four pieces at most."""
     law = SpeedLaw(time=(0.0, 0.1), speed=(300.0, 345.0))
-    setup = prepare(
-        machine(), 345.0, contact=Contact(), integrator=Integrator(), samples_per_revolution=36, probes=PROBES
-    )
+    setup = prepared(machine(), 345.0, samples=36, probes=PROBES)
     recording = Recording(transient=0, revolutions=law.n_revolution, samples_per_revolution=36)
     case = {"clearance": 1.0, "friction": 0.0, "initial": Initial(from_=CONTACT_FREE)}
     monkeypatch.setattr(ripples, "PROMISED", 1e-3)

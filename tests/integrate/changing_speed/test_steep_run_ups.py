@@ -9,7 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from closed_form import Contact, run_up
+from closed_form import run_up
+from set_ups import prepared
 
 from rubhpc import LumpedStator, Probe, Rig, Unbalance
 from rubhpc.fem.assemble import assemble, model_at
@@ -17,13 +18,12 @@ from rubhpc.fem.probes import with_probes
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.changing_speed.case import record_run_up
 from rubhpc.integrate.packing import whole_system
-from rubhpc.integrate.setup import prepare
 from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.rig.parts import Damping, Disc, ShaftSection, Torsion
 from rubhpc.rig.rotors import Rotor
 from rubhpc.study.initial import CONTACT_FREE, Initial
 from rubhpc.study.speed_law import SpeedLaw
-from rubhpc.study.study import Integrator, Recording
+from rubhpc.study.study import Recording
 
 STEEL = {"youngs_modulus": 2.1e11, "shear_modulus": 8e10, "density": 7800.0}
 SPEEDS = (150.0, 260.0, 380.0, 520.0)  # rad/s
@@ -217,9 +217,7 @@ def test_pairs_that_part_are_not_struck_again():
     """What modes that follow the speed leave of an overlap as a pair opens makes no chatter of events."""
     law = SpeedLaw(time=(0.0, 0.1, 0.14, 0.24), speed=(300.0, 302.0, 320.0, 323.0))
     recording = Recording(transient=0, revolutions=law.n_revolution, samples_per_revolution=PER_REVOLUTION)
-    setup = prepare(
-        machine(8), 323.0, contact=Contact(), integrator=Integrator(), samples_per_revolution=PER_REVOLUTION
-    )
+    setup = prepared(machine(8), 323.0, samples=PER_REVOLUTION)
     case = {"recording": recording, "initial": Initial(from_=CONTACT_FREE), **RUB}
     passage, steady = record_run_up(setup, law, **case), run_case(setup, **case)
     assert passage.measures["contact_fraction"].sum() > 1.0

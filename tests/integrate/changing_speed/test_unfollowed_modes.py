@@ -5,14 +5,14 @@ import pytest
 from closed_form import Contact
 from equal_stators import in_ring
 from overhung_pump import pump
+from set_ups import prepared
 from test_steep_run_ups import machine
 
 from rubhpc.integrate.changing_speed import range_library
 from rubhpc.integrate.changing_speed.case import record_run_up
-from rubhpc.integrate.setup import prepare
 from rubhpc.study.initial import CONTACT_FREE, Initial
 from rubhpc.study.speed_law import SpeedLaw
-from rubhpc.study.study import Integrator, Recording
+from rubhpc.study.study import Recording
 
 SAMPLES = 64
 LAW = SpeedLaw(time=(0.0, 0.15), speed=(300.0, 360.0))
@@ -20,13 +20,7 @@ CASE = {"clearance": 1.5e-4, "friction": 0.05, "initial": Initial(from_=CONTACT_
 
 
 def run(contact):
-    setup = prepare(
-        in_ring(pump(), 6, first=0.2),
-        360.0,
-        contact=contact,
-        integrator=Integrator(),
-        samples_per_revolution=SAMPLES,
-    )
+    setup = prepared(in_ring(pump(), 6, first=0.2), 360.0, samples=SAMPLES, contact=contact)
     recording = Recording(transient=0, revolutions=LAW.n_revolution, samples_per_revolution=SAMPLES)
     return record_run_up(setup, LAW, recording=recording, **CASE).arrays
 
@@ -58,9 +52,7 @@ def test_a_case_without_contact_does_not_depend_on_one_with_contact():
     recording = Recording(transient=0, revolutions=law.n_revolution, samples_per_revolution=SAMPLES)
 
     def run_both(clearances):
-        setup = prepare(
-            machine(1), 420.0, contact=Contact(), integrator=Integrator(), samples_per_revolution=SAMPLES
-        )
+        setup = prepared(machine(1), 420.0, samples=SAMPLES)
         case = {"recording": recording, "friction": 0.1, "initial": CASE["initial"]}
         return [record_run_up(setup, law, clearance=c, **case).arrays for c in clearances]
 

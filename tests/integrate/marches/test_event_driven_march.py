@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from closed_form import Contact, read_rig, simulate
+from closed_form import read_rig, simulate
 from equal_stators import in_ring
 from record_distance import MOTIONS
+from set_ups import prepared
 from trial_rig import trial_rig, turn
 
 from rubhpc import State
@@ -26,7 +27,6 @@ from rubhpc.integrate.measuring.divergence import energy_limit
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.reduced_model import mode_library, table_stack
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
-from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.case_progress import CONTACT_UNSOLVED
 from rubhpc.kernels.collocation.structures import JAMMED
 from rubhpc.recent import forget
@@ -36,7 +36,7 @@ from rubhpc.rig.rig import Rig
 from rubhpc.rig.rotors import Rotor, Unbalance
 from rubhpc.rig.stators import LumpedStator
 from rubhpc.schema import DIVERGED, DONE, SCHEMES
-from rubhpc.study.study import Integrator, Recording
+from rubhpc.study.study import Recording
 
 SPEED = 170.0
 RUB = {"speed": SPEED, "clearance": "80 um", "friction": 0.2, "transient": 1, "revolutions": 2}
@@ -109,9 +109,7 @@ def test_neighbours_do_not_depend_on_what_is_forgotten(monkeypatch):
     monkeypatch.setattr(table_stack, "MOST_MODES", 6)
     ratios = []
     for is_crowded in (False, True):
-        setup = prepare(
-            trial_rig(3), SPEED, contact=Contact(), integrator=Integrator(), samples_per_revolution=64
-        )
+        setup = prepared(trial_rig(3), SPEED)
         if is_crowded:
             crowd(setup.library(0.2))
         neighbours = CarriedTangent(PiecewiseMotion(setup, 60e-6, 0.2, State.at_rest(setup.model)))
@@ -357,12 +355,12 @@ def test_signals_are_answered_however_long_a_revolution_lasts(normal):
             raise KeyboardInterrupt
 
     wall = LumpedStator(node=1, rigid=True, radius=1.0)
-    setup = prepare(
+    setup = prepared(
         Rig.from_matrices([[1.0]], None, [[4e5]], degrees=[(1, "v")], stators=[wall]),
         turn(1600.0),
-        contact=Contact(normal=normal, restitution=1.0),
-        integrator=Integrator(),
-        samples_per_revolution=16,
+        samples=16,
+        normal=normal,
+        restitution=1.0,
     )
     thrown = replace(State.at_rest(setup.model), rotor_velocity=np.array([0.1]))
     with pytest.raises(KeyboardInterrupt):

@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
-from closed_form import Contact, read_rig
+from closed_form import read_rig
+from set_ups import prepared
 
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import first_lateral_frequency
 from rubhpc.integrate.case import MARCHES
-from rubhpc.integrate.setup import prepare
 from rubhpc.integrate.start import at_rest
 from rubhpc.integrate.transient import idle_of, pass_revolutions
-from rubhpc.study.study import Integrator, Recording
+from rubhpc.study.study import Recording
 
 N, CLEARANCE = 12, 84e-6
 RECORDING = Recording(samples_per_revolution=64)
@@ -20,10 +20,7 @@ def march_of(contact, ratio=0.75, **limits):
     rig = read_rig("mokhtar2017")
     model = assemble(rig)
     spin = ratio * first_lateral_frequency(model)
-    setup = prepare(
-        rig, spin, contact=Contact(**contact), integrator=Integrator(), samples_per_revolution=64,
-        model=model,
-    )  # fmt: skip
+    setup = prepared(rig, spin, model=model, **contact)  # fmt: skip
     for name, value in limits.items():
         object.__setattr__(setup, name, value)
     return MARCHES[setup.scheme](setup, CLEARANCE, 0.3, at_rest(setup, CLEARANCE), None)

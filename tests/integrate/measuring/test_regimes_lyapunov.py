@@ -6,9 +6,10 @@ from itertools import islice
 
 import numpy as np
 import pytest
-from closed_form import Contact, read_rig, simulate
+from closed_form import read_rig, simulate
 from impact_map import RESTITUTION, next_impact
 from scipy.optimize import fsolve
+from set_ups import prepared
 
 from rubhpc import LumpedStator, Rig, State, Unbalance
 from rubhpc.integrate.carried_tangent import CarriedTangent
@@ -17,9 +18,8 @@ from rubhpc.integrate.marches.central_difference import CentralDifferenceMarch
 from rubhpc.integrate.marches.collocation import CollocationMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
-from rubhpc.integrate.setup import prepare
 from rubhpc.schema import REGIME
-from rubhpc.study.study import Integrator, Recording
+from rubhpc.study.study import Recording
 
 MARCHES = {
     "modal": EventDrivenMarch,
@@ -51,12 +51,13 @@ def oscillator(spin, *, damping=None, restitution=None, wall=1e-12):
 def growth_of(rig, given, state, n_span, march=EventDrivenMarch):
     """Growth per revolution in spans after a state, of a case given as to `simulate`."""
     method = "central-difference" if march is CentralDifferenceMarch else "modal"
-    setup = prepare(
+    setup = prepared(
         rig,
         given["speed"],
-        contact=Contact(restitution=given.get("restitution")),
-        integrator=Integrator(method=method, step=given.get("step")),
-        samples_per_revolution=given["samples_per_revolution"],
+        samples=given["samples_per_revolution"],
+        method=method,
+        step=given.get("step"),
+        restitution=given.get("restitution"),
     )
     if state is None:
         state = State.at_rest(setup.model)

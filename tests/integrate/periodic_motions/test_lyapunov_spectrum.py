@@ -5,16 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from closed_form import Contact, periodic, simulate
+from closed_form import periodic, simulate
 from impact_map import RESTITUTION, next_impact
+from set_ups import prepared
 
 import rubhpc
 from rubhpc import LumpedStator, Rig, State, Unbalance
 from rubhpc.errors import InputError
 from rubhpc.integrate.periodic_motions.collocated_motion import followed_motion
 from rubhpc.integrate.periodic_motions.lyapunov_spectrum import exponents, kaplan_yorke_dimension
-from rubhpc.integrate.setup import prepare
-from rubhpc.study.study import Integrator, Recording
+from rubhpc.study.study import Recording
 
 SPIN = 2.8  # period doublings have led to chaos there
 
@@ -92,10 +92,7 @@ def test_impact_oscillator_has_the_exponents_of_its_map():
 )
 def test_sum_is_the_trace_of_the_flow_between_impacts_and_in_contact(contact, damping, allowed):
     """Chaos: dampers act for as long as they are pressed, impacts take a share each, and events nothing."""
-    setup = prepare(
-        oscillator(damping), SPIN, contact=Contact(**contact), integrator=Integrator(step=1e-3),
-        samples_per_revolution=64,
-    )  # fmt: skip
+    setup = prepared(oscillator(damping), SPIN, step=1e-3, **contact)  # fmt: skip
     begun = replace(State.at_rest(setup.model), rotor_velocity=np.array([0.3]))
     motion = followed_motion(setup.scheme)(setup, 1e-12, 0.0, begun)
     found = exponents(motion, 2, aligning=0, followed=100)

@@ -1,16 +1,15 @@
 """The proof of a record that begins on a motion that was solved for, or looks like another one."""
 
 import pytest
-from closed_form import Contact, periodic, simulate
+from closed_form import periodic, simulate
 from overhung_pump import pump
+from set_ups import prepared
 from trial_rig import trial_rig
 
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.periodic_motions import proof
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
-from rubhpc.integrate.setup import prepare
 from rubhpc.schema import REGIME
-from rubhpc.study.study import Integrator
 
 TWICE = {
     "speed_ratio": 3.0, "clearance_ratio": 0.5, "friction": 0.2, "overrides": {"rotor.damping.alpha": 4.0},
@@ -82,9 +81,7 @@ def test_chaos_that_dies_out_has_not_settled(revolutions):
 def test_revolutions_of_many_pairs_are_followed_less_far(monkeypatch, count, many, looks, expected):
     given = {"clearance": 80e-6, "friction": 0.2, "samples_per_revolution": 64}
     record = simulate(trial_rig(count), speed=170.0, transient=2, revolutions=1, keep=(), **given)
-    setup = prepare(
-        trial_rig(count), 170.0, contact=Contact(), integrator=Integrator(), samples_per_revolution=64
-    )
+    setup = prepared(trial_rig(count), 170.0)
     passed, on = [], EventDrivenMarch.pass_sections
 
     def counted(march, n_revolution, *args):

@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 from closed_form import Contact, read_rig
+from set_ups import prepared
 from trial_rig import trial_rig
 
 from rubhpc import LumpedStator
@@ -15,9 +16,8 @@ from rubhpc.integrate.case import run_case
 from rubhpc.integrate.periodic_motions.collocated_motion import CollocatedMotion
 from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.integrate.periodic_motions.saltation import monodromy
-from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import with_keys
-from rubhpc.study.study import Integrator, Recording
+from rubhpc.study.study import Recording
 
 PAPER = read_rig("mokhtar2017")
 SPRINGS = LumpedStator(node=8, radius=0.06, count=8, mass=1e-3, damping=2.0, stiffness=1e5)
@@ -32,9 +32,7 @@ def motion_of(rig, ratio, clearance_ratio, friction, contact=SLIDING, transient=
     model = assemble(rig)
     spin = ratio * first_lateral_frequency(model)
     clearance = clearance_ratio * contact_free_amplitude(model, spin)
-    setup = prepare(
-        rig, spin, contact=contact, integrator=Integrator(), samples_per_revolution=64, model=model
-    )
+    setup = prepared(rig, spin, contact=contact, model=model)
     record = run_case(
         setup,
         clearance=clearance,

@@ -5,17 +5,17 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from closed_form import Contact, read_rig, simulate
+from closed_form import read_rig, simulate
+from set_ups import prepared
 
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.periodic_motions.approach import Approach
 from rubhpc.integrate.periodic_motions.solved_motion import MOST_KEPT, SolvedMotions, rounded, solved_motions
 from rubhpc.integrate.periodic_motions.tolerances import TO_ROUNDING
-from rubhpc.integrate.setup import prepare
 from rubhpc.rig.reading import with_keys
 from rubhpc.schema import REGIME
 from rubhpc.study.initial import Initial
-from rubhpc.study.study import Integrator, Recording
+from rubhpc.study.study import Recording
 
 SPEED, CLEARANCE, FRICTION = 1.5 * 2.0 * math.pi * 31.56, 300e-6, 0.1  # rub and no contact coexist
 SHORT = {"revolutions": 4, "samples_per_revolution": 32, "keep": ("section",)}
@@ -28,7 +28,7 @@ STARTS = [
 
 def set_up():
     rig = with_keys(read_rig("mokhtar2017"), {"stator.youngs_modulus": 30e9})
-    return prepare(rig, SPEED, contact=Contact(), integrator=Integrator(), samples_per_revolution=32)
+    return prepared(rig, SPEED, samples=32)
 
 
 def run(setup, initial, transient="direct"):

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from calling import called
-from closed_form import Contact
 from scipy.linalg import expm
+from set_ups import prepared
 from trial_rig import trial_rig
 
 from rubhpc.fem.assemble import assemble
@@ -14,7 +14,6 @@ from rubhpc.integrate.reduced_model import mode_library
 from rubhpc.integrate.reduced_model.contact_mode import solve_contact_mode
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
 from rubhpc.integrate.reduced_model.reduction import directions, reduce_model
-from rubhpc.integrate.setup import prepare
 from rubhpc.kernels.contact_modes import (
     LANES,
     LATERAL_RATE,
@@ -28,7 +27,6 @@ from rubhpc.kernels.contact_modes import (
 )
 from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.measuring import energies_gained
-from rubhpc.study.study import Integrator
 
 energies_gained = called(energies_gained)
 enter = called(enter)
@@ -268,9 +266,7 @@ def test_longest_step_within_a_count_of_ticks(count):
 
 def test_modes_that_were_given_up_are_counted_again():
     """A plan has to know what contact modes cost, not how many there are."""
-    setup = prepare(
-        trial_rig(3), 180.0, contact=Contact(), integrator=Integrator(), samples_per_revolution=64
-    )
+    setup = prepared(trial_rig(3), 180.0)
     library = setup.library(0.2)
     for mask in (1, 2):
         library.add(mask)
@@ -283,9 +279,7 @@ def test_modes_that_were_given_up_are_counted_again():
 def test_tables_of_many_pairs_hold_one_sample(monkeypatch):
     """No step passes a sample then: those of several would be a third of the memory of a large ring."""
     monkeypatch.setattr(mode_library, "FEW_PAIRS", 2)
-    setup = prepare(
-        trial_rig(3), 180.0, contact=Contact(), integrator=Integrator(), samples_per_revolution=64
-    )
+    setup = prepared(trial_rig(3), 180.0)
     tables = setup.library(0.2).tables()
     assert tables.output.shape[2] == -(-(N_ROTOR_ROW + 9) // LANES) * LANES
     assert tables.power_re.shape[1] == setup.sample_level + 1
