@@ -12,10 +12,14 @@ import sys
 from collections import Counter
 from dataclasses import replace
 from itertools import product
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+sys.path.append(str(Path(__file__).parents[1] / "support"))
 from closed_form import read_rig, simulate
+from equal_stators import in_ring
 from test_laws import ROWS
 
 from postproc.signals import contacts
@@ -37,8 +41,7 @@ BARE: dict[str, Any] = {"samples_per_revolution": 64, "keep": ()}
 
 def ring(stator: Any, count: int) -> Rig:
     """Return the packaged rotor in a ring of equal stators."""
-    turned = (replace(stator, angle=2.0 * math.pi * i / count) for i in range(count))
-    return replace(STIFF, stator=tuple(turned))
+    return in_ring(replace(STIFF, stator=(stator,)), count)
 
 
 def closed_form() -> None:
@@ -196,11 +199,11 @@ def lasting() -> None:
             rotor, node = (overhung, 13) if is_overhung else (PACKAGED.rotor, 8)
             rotor = replace(rotor, gravity=9.81 * (random.random() < 0.3))
             stator = replace(PACKAGED.stator[0], node=node, youngs_modulus=10 ** random.uniform(9.3, 11))
-            turned = (replace(stator, angle=2.0 * math.pi * i / count) for i in range(count))
             damping = 10 ** random.uniform(0.3, 1.1) if is_overhung else 31.7
             case: dict[str, Any] = {
                 "rig": with_keys(
-                    replace(PACKAGED, rotor=rotor, stator=tuple(turned)), {"rotor.damping.alpha": damping}
+                    in_ring(replace(PACKAGED, rotor=rotor, stator=(stator,)), count),
+                    {"rotor.damping.alpha": damping},
                 ),
                 "speed_ratio": random.uniform(0.6, 4.0 if is_overhung else 6.0),
                 "clearance_ratio": random.uniform(0.4, 0.97),

@@ -13,7 +13,9 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 
+sys.path.append(str(Path(__file__).parents[1] / "support"))
 from closed_form import read_rig, simulate
 
 from rubhpc.integrate.modal_setup import ModalSetup

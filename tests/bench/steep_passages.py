@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 TESTS = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(TESTS / "integrate" / "changing_speed"), str(TESTS / "support")]
+sys.path += [str(TESTS / "integrate" / "changing_speed"), str(TESTS / "support")]
 
 from set_ups import prepared  # noqa: E402
 from test_steep_run_ups import (  # noqa: E402

@@ -102,13 +102,10 @@ def test_motion_without_contact_is_the_steady_response():
         ({"period": 1.5}, "periodic: period: 1.5 is not a whole number"),
         ({"period": "2"}, "periodic: period: .2. is not a whole number"),
         ({"repeat": 2.5}, "periodic: repeat: 2.5 is not a whole number"),
-        ({"speed_ratio": 0, "clearance": None, "clearance_ratio": 0.7}, "speed: 0 rad/s; .* it has to turn"),
         ({"repeat": 0}, "repeat: 0 is out of range"),
         ({"method": "central-difference"}, "it needs .integrator. method"),
         ({"initial": 1.0}, "periodic: initial: 1.0 is neither a State nor a dict"),
-        ({"friction": -1.0}, "periodic: friction: -1 is out of range"),
         ({"frction": 0.2}, "periodic: frction: unknown argument; did you mean friction"),
-        ({"law": 3}, "periodic: law: 3 is not text"),
         ({"slip_speed": ["0 m"]}, "periodic: slip_speed: value 1: "),
     ],
 )

@@ -12,10 +12,9 @@ import pytest
 from rubhpc.running import plan, sampled_cases
 from rubhpc.running.case_setup import MOST_BYTES
 from rubhpc.running.plan import make_plan
-from rubhpc.running.sampled_cases import CaseTimer, Sample, Timed, Trail, in_spread_order, part_of
+from rubhpc.running.sampled_cases import CaseTimer, Sample, Timed, Trail, in_spread_order
 from rubhpc.storage.duration import span
 from rubhpc.study.cases import CaseGrid
-from rubhpc.study.speed_law import SpeedLaw
 from rubhpc.study.study import read_study
 from tests.support.running import write_study
 
@@ -78,13 +77,6 @@ def test_only_missing_cases_are_sampled():
     missing = np.zeros((4, 30, 3), bool)
     missing[-1, ::5, 0] = True
     assert sorted(in_spread_order(missing)) == [tuple(index) for index in np.argwhere(missing).tolist()]
-
-
-def test_part_of_a_run_up_has_its_speeds():
-    law = SpeedLaw(time=(0.0, 4.0, 10.0), speed=(50.0, 300.0, 100.0))
-    part = part_of(law, 100, 116)
-    assert part.n_revolution == 16
-    assert part.speed[0] == pytest.approx(law.at_angle(2 * np.pi * np.array([100.0]))[1][0])
 
 
 def test_a_long_run_up_is_known_by_parts_of_it(tmp_path, monkeypatch):

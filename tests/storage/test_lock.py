@@ -37,18 +37,13 @@ def leave(path: Path, **changes: object) -> None:
     path.write_text(json.dumps(asdict(replace(Holder.myself(), **changes))))
 
 
-def test_a_second_run_is_refused_and_reported_by_whom(path):
-    with Lock(path), pytest.raises(StoreError, match=f"process {os.getpid()} on {socket.gethostname()}"):
-        Lock(path).__enter__()
-    assert not path.exists()
-
-
-def test_a_refused_run_leaves_the_lock_alone(path):
+def test_a_second_run_is_refused_by_the_name_of_the_first_and_leaves_its_lock_alone(path):
     with Lock(path):
         before = path.read_bytes()
-        with pytest.raises(StoreError):
+        with pytest.raises(StoreError, match=f"process {os.getpid()} on {socket.gethostname()}"):
             Lock(path).__enter__()
         assert path.read_bytes() == before
+    assert not path.exists()
 
 
 def test_the_lock_of_a_dead_process_is_taken_over(path, dead_pid):

@@ -246,20 +246,9 @@ def test_rub_is_the_same_at_every_angle_around_the_rim(run, packaged, normal):
             check_close(getattr(record, name), getattr(upright, name), 1e-6, (name, angle))
 
 
-# Speed ratio, ratio of critical, amplitude (um): L11
-FREE = [
-    (0.75, 0.05, 125.043),
-    (1.5, 0.05, 175.875),
-    (2.0, 0.05, 130.556),
-    (3.0, 0.05, 109.369),
-    (0.75, 0.10, 120.009),
-    (1.5, 0.10, 172.246),
-    (2.0, 0.10, 129.698),
-    (3.0, 0.10, 109.140),
-]
-
-
-@pytest.mark.parametrize(("speed_ratio", "ratio", "amplitude"), FREE)
+@pytest.mark.parametrize(  # of L11: speed ratio, ratio of critical, amplitude (um)
+    ("speed_ratio", "ratio", "amplitude"), [(0.75, 0.05, 125.043), (1.5, 0.10, 172.246), (3.0, 0.05, 109.369)]
+)
 def test_stator_out_of_reach_is_not_felt(packaged, method, speed_ratio, ratio, amplitude):
     """E9: on the steady orbit with the stator just out of reach, nothing happens; just within, it touches."""
     damping = Damping(alpha=2 * ratio * 2 * math.pi * 31.56)

@@ -160,8 +160,6 @@ def test_cases_along_a_speed_share_a_basis_and_are_followed_as_they_are_recorded
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        ({"period": 65}, "period: 65 is out of range"),
-        ({"period": 1.5}, "branch: period: 1.5 is not a whole number"),
         ({"sweeps": 1.5}, "branch: sweeps: 1.5 is not a whole number"),
         ({"along": "contact.restitution"}, "branch: along: contact.restitution cannot be followed"),
         ({"sweeps": -1}, "sweeps: -1 is out of range; it must be at least 0"),
@@ -171,10 +169,8 @@ def test_cases_along_a_speed_share_a_basis_and_are_followed_as_they_are_recorded
         ({"largest_step": "-1 um"}, "largest_step: -1 um is out of range"),
         ({"clearance": 1e-4}, "clearance: varies along the branch"),
         ({"start": "1 kg"}, "branch: start: "),
-        ({"method": "central-difference"}, "branches need .integrator. method"),
         ({"along": "clearance_ratio", "start": 0.9, "stop": -0.2}, "clearance_ratio must be at least 0"),
         ({"along": 3}, 'branch: along: 3 is not the name of an axis; give one, such as "friction"'),
-        ({"keep": 1}, "branch: keep: 1 is not a list of names"),
     ],
 )
 def test_bad_arguments_are_refused(arguments, text):

@@ -249,16 +249,10 @@ def test_torques_are_linear_between_speeds_and_constant_beyond():
     ("keys", "says"),
     [
         ({"start": 100.0, "revolutions": 9}, "torque: missing"),
-        ({"torque": 1.0, "revolutions": 9}, "start: missing"),
-        ({"torque": 1.0, "start": 100.0}, "revolutions: missing"),
         ({"torque": "1 N", "start": 9.0, "revolutions": 9}, "torque: value 1"),
         ({"torque": [1.0, 0.0], "start": 9.0, "revolutions": 9}, "2 values for 0 speeds; give one for each"),
         ({"torque": [1.0, 0.0], "speed": [9.0, 1.0], "start": 9.0, "revolutions": 9}, "do not rise"),
         ({"torque": 1.0, "start": 0.0, "revolutions": 9}, "start: 0 rad/s is out of range"),
-        (
-            {"torque": 1.0, "start": 10.0, "lowest": 20.0, "revolutions": 9},
-            "190.986 rpm is not below",
-        ),
         ({"torque": -1e3, "start": 100.0, "revolutions": 9}, "the spin falls to 95.49 rpm within the first"),
         ({"torqe": 1.0, "start": 100.0, "revolutions": 9}, "did you mean torque?"),
     ],

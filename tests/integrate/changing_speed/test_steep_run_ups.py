@@ -75,14 +75,23 @@ def machine(count=1):
     return Rig(name="three bearings", rotor=rotor, stator=stators)
 
 
+def system_of(base):
+    """Mass, gyroscopic terms, unbalance at unit speed, constant load, and turning as one, of all degrees."""
+    mass, damping, _, _ = whole_system(base, 0.0)
+    n, rotor = len(mass), base.rotor
+    phasor, load, spinning = np.zeros(n, complex), np.zeros(n), np.zeros(n)
+    phasor[: rotor.n_dof] = base.unbalance_cosine - 1j * base.unbalance_sine
+    load[: rotor.n_dof] = base.load
+    spinning[: rotor.n_dof] = [name == "thx" for _, name in rotor.degrees]
+    return mass, whole_system(base, 1.0)[1] - damping, phasor, load, spinning
+
+
 def stepped(rig, law):
     """Accelerations at the probes, (4, n_sample), by Newmark's method with an even acceleration."""
     base = assemble(rig)
+    mass, gyroscopic, phasor, load, spinning = system_of(base)
     grid = np.arange(min(law.speed) - 1.0, max(law.speed) + 1.0)
     tables = np.array([whole_system(model_at(base, speed), 0.0)[1:3] for speed in grid])
-    mass, damping, _, _ = whole_system(base, 0.0)
-    gyroscopic = whole_system(base, 1.0)[1] - damping
-    n, rotor = len(mass), base.rotor
 
     def matrices(speed, rate):
         place = min(int(speed - grid[0]), grid.size - 2)
@@ -90,10 +99,6 @@ def stepped(rig, law):
         held = (1.0 - share) * tables[place] + share * tables[place + 1]
         return held[0] + speed * gyroscopic, held[1] + rate * gyroscopic
 
-    phasor, load, spinning = np.zeros(n, complex), np.zeros(n), np.zeros(n)
-    phasor[: rotor.n_dof] = base.unbalance_cosine - 1j * base.unbalance_sine
-    load[: rotor.n_dof] = base.load
-    spinning[: rotor.n_dof] = [name == "thx" for _, name in rotor.degrees]
     angles = 2.0 * math.pi * np.arange(law.n_revolution * PER_REVOLUTION * STEPS) / (PER_REVOLUTION * STEPS)
     times, speeds, rates = law.at_angle(angles)
     first, rate = speeds[0], rates[0]
@@ -233,14 +238,9 @@ def rubbed(rig, law, until, *, is_round=False):
     `is_round`: along the line of centres in the middle of each step.
     """
     base = assemble(rig)
-    mass, damping, _, _ = whole_system(base, 0.0)
-    gyroscopic = whole_system(base, 1.0)[1] - damping
+    mass, gyroscopic, phasor, load, spinning = system_of(base)
     n, rotor, q = len(mass), base.rotor, len(base.stators)
     lateral, torsion = [rotor.index(9, name) for name in ("v", "w")], rotor.index(9, "thx")
-    phasor, load, spinning = np.zeros(n, complex), np.zeros(n), np.zeros(n)
-    phasor[: rotor.n_dof] = base.unbalance_cosine - 1j * base.unbalance_sine
-    load[: rotor.n_dof] = base.load
-    spinning[: rotor.n_dof] = [name == "thx" for _, name in rotor.degrees]
     axis = np.exp(1j * np.array([stator.angle for stator in base.stators]))
     tip = [first + stator.axial for first, stator in zip(base.stator_start, base.stators, strict=True)]
     radius = np.array([stator.radius for stator in base.stators])

@@ -130,10 +130,6 @@ def test_motion_whose_neighbours_part_is_chaotic(rate):
     assert exponent == pytest.approx(math.log(2) if rate == 4.0 else 0.35, abs=0.2)
 
 
-def test_motion_whose_neighbours_close_up_is_periodic():
-    assert of(settling(0.95), repeat(math.log(0.95))) == ("periodic", pytest.approx(math.log(0.95)))
-
-
 @pytest.mark.parametrize(
     ("rate", "expected"), [(0.02, "chaotic"), (-0.02, "periodic"), (0.005, "quasi_periodic")]
 )
@@ -199,46 +195,56 @@ def judged(whirl, solve, *, period=3, growth=None, later=None, lasts=None, n_eve
     return REGIME[verdict.flag], verdict
 
 
-def test_record_that_agrees_with_a_stable_solution_is_periodic():
-    whirl = torus(1 / 3)
-    name, verdict = judged(whirl, closing(3, 0.3 - 0.4j, whirl))
-    assert (name, verdict.period, verdict.is_reached) == ("periodic", 3, True)
+def no_solution(asked):
+    """A solver that finds nothing."""
+
+
+THIRD, DRAWN = torus(1 / 3), np.exp(1j * TURN)
+WEAK = torus(GOLDEN, amount=0.002)  # cycles differ by 0.4 %
+DECAY = np.exp(-TURN / (2 * math.pi * 40))  # to 0.2 within the record
+# Record, its period, a solver, how neighbours part if that may be asked for; regime, period, and whether it
+# has been reached.
+JUDGED = {
+    "agrees with a stable motion": (THIRD, 3, closing(3, 0.3 - 0.4j, THIRD), None, ("periodic", 3, True)),
+    "of three within six revolutions": (THIRD, 6, closing(3, 0.9, THIRD), None, ("periodic", 3, True)),
+    "drifts along a torus": (
+        torus(1 / 3 + 1e-4),  # for neighbouring cycles it looks like an unstable motion inside
+        3,
+        closing(3, 1.02j, torus(1 / 3 + 1e-4)),
+        0.0,
+        ("quasi_periodic", 0, True),
+    ),
+    "weak chaos": (THIRD, 3, no_solution, 0.1, ("chaotic", 0, False)),
+    "weak chaos beside an unstable motion": (THIRD, 3, closing(3, 1.1, THIRD), 0.1, ("chaotic", 0, False)),
+    "beside another motion": (THIRD, 3, closing(3, 0.5, THIRD, shift=0.5), 0.1, ("chaotic", 0, False)),
+    "draws near": (DRAWN * (1 + 0.2 * DECAY), 1, closing(1, 0.98, DRAWN), None, ("periodic", 1, False)),
+    "no solution, neighbours close up": (THIRD, 3, no_solution, -0.1, ("periodic", 3, True)),
+    "torus within the tolerance": (WEAK, 1, no_solution, 0.0, ("quasi_periodic", 0, True)),
+    "the same, short": (WEAK[: 8 * SAMPLES], 1, no_solution, None, ("undecided", 0, True)),
+    "short, no solution": (THIRD[: 8 * SAMPLES], 3, no_solution, None, ("periodic", 3, True)),
+    # Beside an unstable motion of two frequencies lies a torus, unless neighbours close up at a rate that
+    # nothing but a locked motion has.
+    "unstable at an angle": (THIRD, 3, closing(3, 0.6 + 0.81j, THIRD), -0.03, ("quasi_periodic", 0, True)),
+    "locked": (THIRD, 3, closing(3, 0.6 + 0.81j, THIRD), -0.1, ("periodic", 0, True)),
+    "unstable at no angle": (THIRD, 3, closing(3, 1.008, THIRD), -0.03, ("periodic", 0, True)),
+}
+
+
+@pytest.mark.parametrize("name", JUDGED)
+def test_records_are_judged_by_solutions_and_how_neighbours_part(name):
+    whirl, period, solve, rate, expected = JUDGED[name]
+    found, verdict = judged(whirl, solve, period=period, growth=None if rate is None else repeat(rate))
+    assert (found, verdict.period, verdict.is_reached) == expected
+    if rate is not None:
+        assert verdict.exponent == pytest.approx(rate, abs=1e-15)
+
+
+def test_multiplier_is_that_of_the_solution():
+    verdict = judged(THIRD, closing(3, 0.3 - 0.4j, THIRD))[1]
     assert verdict.multiplier == 0.3 + 0.4j
     assert math.isnan(verdict.exponent)
-
-
-def test_period_is_that_of_the_solution():
-    """What looks like six revolutions within 1 % is one of three."""
-    whirl = torus(1 / 3)
-    assert judged(whirl, closing(3, 0.9, whirl), period=6)[1].period == 3
-
-
-def test_orbit_that_drifts_along_a_torus_is_not_periodic():
-    """What it looks like for neighbouring cycles is an unstable motion inside."""
-    whirl = torus(1 / 3 + 1e-4)
-    name, verdict = judged(whirl, closing(3, 1.02j, whirl), growth=iter([0.0] * 64))
-    assert (name, verdict.period) == ("quasi_periodic", 0)
-    assert math.isnan(abs(verdict.multiplier))
-
-
-def test_weak_chaos_is_not_periodic_for_a_tolerance():
-    whirl = torus(1 / 3)
-    for solve in (lambda asked: None, closing(3, 1.1, whirl)):
-        name, verdict = judged(whirl, solve, growth=iter([0.1] * 16))
-        assert (name, verdict.period, verdict.exponent) == ("chaotic", 0, pytest.approx(0.1))
-
-
-def test_another_motion_proves_nothing():
-    whirl = torus(1 / 3)
-    name, verdict = judged(whirl, closing(3, 0.5, whirl, shift=0.5), growth=iter([0.1] * 16))
-    assert (name, verdict.period) == ("chaotic", 0)
-
-
-def test_record_that_draws_near_is_periodic_but_has_not_settled():
-    decay = np.exp(-TURN / (2 * math.pi * 40))  # to 0.2 within the record
-    steady = np.exp(1j * TURN)
-    name, verdict = judged(steady * (1 + 0.2 * decay), closing(1, 0.98, steady), period=1)
-    assert (name, verdict.period, verdict.is_reached) == ("periodic", 1, False)
+    drifts = torus(1 / 3 + 1e-4)
+    assert math.isnan(abs(judged(drifts, closing(3, 1.02j, drifts), growth=repeat(0.0))[1].multiplier))
 
 
 def test_motion_that_has_doubled_its_period_is_followed():
@@ -258,27 +264,12 @@ def test_motion_that_has_doubled_its_period_is_followed():
     assert asked == [1, 2, 4, 8, 16, 32]
 
 
-def test_without_a_solution_the_growth_has_the_last_word():
-    whirl = torus(1 / 3)
-    name, verdict = judged(whirl, lambda asked: None, growth=iter([-0.1] * 16))
-    assert (name, verdict.period, verdict.exponent) == ("periodic", 3, pytest.approx(-0.1))
-
-
-def test_torus_within_the_tolerance_is_none_the_less_a_torus():
-    """Cycles that differ by 0.4 % repeat themselves for neither period 1 nor any other."""
-    whirl = torus(GOLDEN, amount=0.002)
-    name, verdict = judged(whirl, lambda asked: None, period=1, growth=iter([0.0] * 64))
-    assert (name, verdict.period) == ("quasi_periodic", 0)
-    short = whirl[: 8 * SAMPLES]
-    assert judged(short, lambda asked: None, period=1)[0] == "undecided"
-
-
 @pytest.mark.parametrize("revolutions", [8, 16, 64])
 def test_period_at_which_the_record_returns_is_tried_too(revolutions):
     """Period 4 within 1 % of an unstable motion of period 1, or of one that is not found."""
     whirl = torus(1 / 4, amount=0.003)[: revolutions * SAMPLES]
     locked = closing(4, 0.6, whirl)
-    for other in (lambda asked: None, closing(1, 1.02j, whirl)):
+    for other in (no_solution, closing(1, 1.02j, whirl)):
         name, verdict = judged(
             whirl,
             lambda asked, other=other: locked(asked) if asked == 4 else other(asked),
@@ -295,8 +286,8 @@ def test_motion_that_is_found_further_on_proves_the_record():
         found = closing(6, 0.5, whirl, shift)(6)._replace(is_led_to=True)
         name, verdict = judged(
             whirl,
-            lambda asked: None,
-            later=lambda *_, found=found: [(3, lambda asked: None), (6, lambda asked: found)],
+            no_solution,
+            later=lambda *_, found=found: [(3, no_solution), (6, lambda asked: found)],
         )
         assert (name, verdict.period, verdict.is_reached) == ("periodic", 6, is_reached)
 
@@ -311,10 +302,10 @@ def test_motion_without_a_period_is_what_it_comes_to_later(rate, name):
     for found, expected in trials:
         judgement, verdict = judged(
             whirl,
-            lambda asked: None,
+            no_solution,
             period=0,
             growth=repeat(rate),
-            later=lambda *_, found=found: [(5, lambda asked: None), (3, lambda asked: found)],
+            later=lambda *_, found=found: [(5, no_solution), (3, lambda asked: found)],
             lasts=lambda _: True,
         )
         assert (judgement, verdict.period, verdict.is_reached) == expected
@@ -327,9 +318,9 @@ def test_torus_is_followed_later_while_a_period_of_two_can_be_solved_for(n_event
     orbit = torus(1 / 3)
     led_to = closing(3, 0.5, orbit)(3)._replace(is_led_to=True)
     keys = {"period": 0, "growth": repeat(0.0), "later": lambda *_: [(3, lambda asked: led_to)]}
-    assert judged(torus(GOLDEN), lambda asked: None, n_event=n_event, **keys)[0] == expected
+    assert judged(torus(GOLDEN), no_solution, n_event=n_event, **keys)[0] == expected
     chaotic = keys | {"growth": repeat(0.4)}
-    assert judged(swollen(logistic(3.8)), lambda asked: None, n_event=n_event, **chaotic)[0] == "periodic"
+    assert judged(swollen(logistic(3.8)), no_solution, n_event=n_event, **chaotic)[0] == "periodic"
 
 
 def test_motion_with_a_period_is_not_followed_later():
@@ -346,10 +337,10 @@ def test_chaos_has_settled_if_it_lasts(is_lasting):
         return []
 
     keys = {"period": 0, "later": later, "lasts": lambda _: is_lasting}
-    name, verdict = judged(swollen(logistic(3.8)), lambda period: None, growth=repeat(0.4), **keys)
+    name, verdict = judged(swollen(logistic(3.8)), no_solution, growth=repeat(0.4), **keys)
     assert (name, verdict.is_reached) == ("chaotic", is_lasting)
     keys["lasts"] = lambda _: pytest.fail("no chaos")
-    name, verdict = judged(swollen(logistic(3.8)), lambda period: None, growth=repeat(0.0), **keys)
+    name, verdict = judged(swollen(logistic(3.8)), no_solution, growth=repeat(0.0), **keys)
     assert (name, verdict.is_reached) == ("quasi_periodic", True)
     assert asked == [(False, True), (False, False)]  # looks periodic, looks chaotic
 
@@ -362,20 +353,6 @@ def test_chaos_that_is_not_followed_has_settled_in_a_long_record_alone(n_revolut
     assert verdict.is_reached == (n_revolution == LASTING_REVOLUTIONS)
 
 
-def test_short_record_with_a_period_and_no_solution_is_what_it_looks_like():
-    whirl = torus(1 / 3)[: 8 * SAMPLES]
-    name, verdict = judged(whirl, lambda asked: None)
-    assert (name, verdict.period) == ("periodic", 3)
-
-
-def test_no_more_spans_are_read_than_show_chaos():
-    spans = iter([0.3] * 6 + [0.5] * 10)
-    flag, exponent = by_growth(spans)
-    assert REGIME[flag] == "chaotic"
-    assert exponent == pytest.approx(0.4)
-    assert len(list(spans)) == 4
-
-
 def test_displacement_that_falls_far_before_it_turns_along_a_torus_decays_no_more():
     """By e^6 within 96 revolutions, then not at all: over 64 and 256 of them -0.09 and -0.02 a revolution."""
     fall = [-0.25] * 8 + [-0.0625] * 16 + [0.001] * 300
@@ -383,14 +360,3 @@ def test_displacement_that_falls_far_before_it_turns_along_a_torus_decays_no_mor
     assert (REGIME[flag], abs(exponent) < 0.05) == ("quasi_periodic", True)
     steady = by_growth(iter([-0.02] * 100), is_cheap=True)
     assert (REGIME[steady[0]], steady[1]) == ("periodic", pytest.approx(-0.02))
-
-
-@pytest.mark.parametrize(
-    ("multiplier", "rate", "expected"),
-    [(0.6 + 0.81j, -0.03, "quasi_periodic"), (0.6 + 0.81j, -0.1, "periodic"), (1.008, -0.03, "periodic")],
-)
-def test_record_beside_an_unstable_motion_with_two_frequencies_is_a_torus(multiplier, rate, expected):
-    """Unless neighbours close up at a rate that nothing but a locked motion has."""
-    whirl = torus(1 / 3)
-    name, verdict = judged(whirl, closing(3, multiplier, whirl), growth=iter([rate] * 64))
-    assert (name, verdict.period) == (expected, 0)

@@ -60,6 +60,12 @@ def probed(probes):
     return with_probes(assemble(PACKAGED), PACKAGED, [Probe(**probe) for probe in probes], 220.0)
 
 
+def choose(monkeypatch, kept):
+    """Have modes chosen by another function."""
+    monkeypatch.setattr("rubhpc.integrate.reduced_model.reduction.kept_modes", kept)
+    forget()
+
+
 def number(are_kept):
     return sum(np.count_nonzero(is_kept) for is_kept in are_kept)
 
@@ -82,8 +88,7 @@ def test_rigs_that_need_more_modes_get_them(rig, case, before, monkeypatch):
     assert exact.modal_error == 0.0
     assert record.modal_error < 1e-3
     assert record.remark == ""
-    monkeypatch.setattr("rubhpc.integrate.reduced_model.reduction.kept_modes", below)
-    forget()
+    choose(monkeypatch, below)
     assert found_error(simulate(rig, **case), exact) > before
 
 
@@ -109,11 +114,7 @@ def test_contacts_that_feel_motion_along_the_rim_need_more_modes(keys, case, bef
     exact, record = simulate(rig, **case, accuracy=1e-8), simulate(rig, **case)
     assert exact.modal_error == 0.0
     assert found_error(record, exact) < record.modal_error < 1e-3
-    monkeypatch.setattr(
-        "rubhpc.integrate.reduced_model.reduction.kept_modes",
-        lambda model, spin, accuracy, touch: kept_modes(model, spin, accuracy),
-    )
-    forget()
+    choose(monkeypatch, lambda model, spin, accuracy, touch: kept_modes(model, spin, accuracy))
     assert found_error(simulate(rig, **case), exact) > before
 
 
@@ -128,11 +129,7 @@ def test_tip_that_bounces_on_a_penalty_needs_the_modes_that_it_rings_with(monkey
 
     exact, record = simulate(rig, **case, accuracy=1e-8), simulate(rig, **case)
     assert error(record) < record.modal_error < 1e-3
-    monkeypatch.setattr(
-        "rubhpc.integrate.reduced_model.reduction.kept_modes",
-        lambda model, spin, accuracy, touch: kept_modes(model, spin, accuracy),
-    )
-    forget()
+    choose(monkeypatch, lambda model, spin, accuracy, touch: kept_modes(model, spin, accuracy))
     assert error(simulate(rig, **case)) > 2e-3
 
 
