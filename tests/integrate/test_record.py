@@ -32,15 +32,6 @@ def record():
     )
 
 
-def test_state_at_rest_has_every_degree(record):
-    state = record.final
-    assert state.rotor_displacement.shape == state.rotor_velocity.shape == (MODEL.rotor.n_dof,)
-    assert [d.shape for d in state.stator_displacement] == [(s.body.n_dof,) for s in MODEL.stators]
-    assert [v.shape for v in state.stator_velocity] == [(s.body.n_dof,) for s in MODEL.stators]
-    assert not any(np.any(part) for part in (state.rotor_displacement, *state.stator_velocity))
-    assert state.contact_force.tolist() == [0.0]
-
-
 def test_variables_are_attributes(record):
     assert record.period == 2
     assert record.spin_speed == 100.0
@@ -100,12 +91,6 @@ def test_dataset_is_laid_out_like_a_store(record):
     assert dataset["section"].values.tolist() == [0, 1, 2]
     assert dataset.attrs == {"status": "done", "reason": ""}
     assert dataset["peak_contact_force"].values.tolist() == [1.0, 2.0]
-
-
-def test_dataset_of_scalars_alone_has_no_samples(record):
-    bare = Record(samples_per_revolution=PER_REVOLUTION, measures=record.measures, final=record.final)
-    assert bare.to_dataset().sizes == {"stator": 2}
-    assert repr(bare) == "<Record: done; measures only>"
 
 
 def test_diverged_record_holds_what_was_reached(record):

@@ -10,7 +10,6 @@ import rubhpc
 from rubhpc.errors import InputError
 from rubhpc.integrate.measuring.samples import new_accumulator, no_record
 from rubhpc.integrate.periodic_motions import direct, solved_motion
-from rubhpc.integrate.periodic_motions.approach import Approach
 from rubhpc.integrate.periodic_motions.direct import draws_near
 from rubhpc.integrate.transient import has_settled
 from rubhpc.schema import REGIME
@@ -216,18 +215,6 @@ def test_what_simulation_cannot_resolve_has_arrived():
     )  # fmt: skip
     assert found.transient_revolutions == direct.FIRST
     assert found.period == 1
-
-
-def test_distance_falls_though_the_energy_rises_at_first():
-    monodromy = np.array([[0.9, 5.0], [0.0, 0.8]])
-    approach, apart = Approach(monodromy, np.ones(2)), np.array([0.0, 1.0])
-    energies, squares = [], []
-    for _ in range(5):
-        energies.append(apart @ apart)
-        squares.append(approach.squares(apart[np.newaxis])[0])
-        apart = monodromy @ apart
-    assert energies[1] > 20 * energies[0]
-    assert -np.diff(squares) == pytest.approx(energies[:-1], rel=1e-9)
 
 
 class Spiral:

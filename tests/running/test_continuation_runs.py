@@ -179,14 +179,6 @@ def test_what_is_damaged_in_a_chain_is_computed_again_and_nothing_else(finished,
     assert not verify(study.output)
 
 
-def test_a_chunk_that_is_gone_is_computed_again_from_the_one_before(finished, tmp_path, computed):
-    study = copied(finished, tmp_path)
-    Store(study.output).chunk_files((2, 1, 0, 1))[0].unlink()  # 1.5 and 1.8, down
-    run(study, quiet=True)
-    assert len(computed) == 2
-    assert stored_bytes(study.output) == stored_bytes(finished.output)
-
-
 def test_a_value_put_in_makes_new_cases_of_those_behind_it(finished, tmp_path, computed):
     """1.6 comes after three of the five speeds on the way up, after two on the way down."""
     grown = (*SPEEDS[:3], 1.6, *SPEEDS[3:])

@@ -15,7 +15,7 @@ import xarray as xr
 from running import array_of, journalled_cases, write_sample, write_study
 from stub_physics import Physics, record
 
-from rubhpc.errors import RubError, StoppedEarly, StoreError
+from rubhpc.errors import RubError, StoppedEarly
 from rubhpc.integrate.compilation import compilation
 from rubhpc.running import computing, job, stopping, worker
 from rubhpc.running.case_setup import count_set_ups
@@ -27,7 +27,6 @@ from rubhpc.schema import (
     FAILED,
     MISSING,
 )
-from rubhpc.storage.disk import disk_errors
 from rubhpc.storage.status import read_status
 from rubhpc.storage.store import Store
 from rubhpc.storage.verify import verify
@@ -56,16 +55,6 @@ def raise_error(**_: Any) -> Record:
     raise ZeroDivisionError("by\nzero")
 
 
-def return_nan(*, recording: Recording, **_: Any) -> Record:
-    return record(recording, float("nan"))
-
-
-def never_end(*, check: Callable[[], None], **_: Any) -> Record:
-    while True:
-        time.sleep(0.01)
-        check()
-
-
 def diverge(*, recording: Recording, **_: Any) -> Record:
     return record(recording, float("nan"), DIVERGED, "grew past 1 m")
 
@@ -81,41 +70,6 @@ def test_every_case_gets_its_own_numbers(physics, study):
         np.testing.assert_array_equal(array, friction.astype(array.dtype))
     assert (ds.period == 7).all()
     assert not verify(study.output)
-
-
-def test_cases_of_one_speed_share_a_setup(physics, study):
-    run(study, quiet=True)
-    assert len(physics.prepared) == 2
-
-
-def test_a_finished_study_computes_nothing(physics, study):
-    run(study, quiet=True)
-    before = len(physics.frictions)
-    assert run(study, quiet=True).computed == 0
-    assert len(physics.frictions) == before
-
-
-@pytest.mark.parametrize(
-    ("poison", "reason"),
-    [
-        (raise_error, "ZeroDivisionError: by zero"),
-        (return_nan, "FloatingPointError: vertical is not finite"),
-        (never_end, "over its time limit of 0.05 s"),
-    ],
-    ids=["raises", "nan", "never ends"],
-)
-def test_a_poisoned_case_fails_with_its_reason_and_the_others_finish(physics, study, poison, reason):
-    physics.poison = poison
-    summary = run(replace(study, run=replace(study.run, case_time_limit=0.05)), quiet=True)
-    assert summary.counts == (0, 8, 4, 0, 0)
-    assert summary.exit_code == 1
-    assert {reported for _, reported in summary.reasons} == {reason}
-    assert summary.reasons[0][0] == "speed_ratio=0.9, clearance_ratio=0.7, friction=0.3"
-    assert "\n" not in summary.complaint()
-    ds = xr.open_zarr(study.output)
-    assert (ds.status.sel(friction=0.3) == FAILED).all()
-    assert np.isnan(ds.vertical.sel(friction=0.3)).all()
-    assert (ds.status.sel(friction=[0.1, 0.5]) == DONE).all()
 
 
 def test_failed_cases_are_computed_anew_on_request_only(physics, study):
@@ -200,14 +154,6 @@ def test_a_signal_drops_the_case_in_hand_and_keeps_the_finished_ones(physics, st
     assert not verify(study.output)
 
 
-def test_the_file_stop_stops_one_run(physics, study):
-    run(replace(study, axes=(replace(study.axes[0], values=(0.9,)), *study.axes[1:])), quiet=True)
-    (study.output / "STOP").touch()
-    with pytest.raises(StoppedEarly, match="the file STOP"):
-        run(study, quiet=True)
-    assert run(study, quiet=True).counts == (0, 12, 0, 0, 0)
-
-
 class Clock:
     """A time that passes when the test says so."""
 
@@ -219,14 +165,6 @@ class Clock:
 
     def passes(self, seconds: float) -> None:
         self.now += seconds
-
-
-def test_the_time_limit_drops_the_case_in_hand(physics, study, monkeypatch):
-    clock = Clock(monkeypatch)
-    after(4, lambda: clock.passes(61), physics)
-    with pytest.raises(StoppedEarly, match="the time limit with 8 of 12"):
-        run(study, quiet=True, time_limit=60)
-    assert journalled_cases(study.output) == 4
 
 
 def test_nothing_is_begun_that_will_not_fit(physics, study, monkeypatch):
@@ -273,27 +211,6 @@ def test_the_end_of_the_slurm_job_stops_a_run(physics, study, monkeypatch):
         run(study, quiet=True)
     monkeypatch.setenv("SLURM_JOB_END_TIME", str(int(time.time()) + 3600))
     assert run(study, quiet=True).counts == (0, 12, 0, 0, 0)
-
-
-def test_a_disk_that_fills_up_keeps_what_is_there(physics, study, monkeypatch):
-    write_block = Store.write_block
-    n_block = 0
-
-    def fill_up(self: Store, *arguments: Any) -> None:
-        nonlocal n_block
-        n_block += 1
-        if n_block == 3:
-            with disk_errors(self.path):
-                raise OSError(28, "No space left on device")
-        write_block(self, *arguments)
-
-    monkeypatch.setattr(Store, "write_block", fill_up)
-    with pytest.raises(StoreError, match="the disk is full"):
-        run(study, quiet=True)
-    n_before = journalled_cases(study.output)
-    assert n_before > 0
-    assert run(study, quiet=True).computed == 12 - n_before
-    assert not verify(study.output)
 
 
 def test_a_block_found_damaged_on_the_way_is_computed_whole(physics, study):

@@ -16,7 +16,6 @@ from postproc.cases.reduction import open_in_pieces
 from rubhpc.errors import StoppedEarly
 from rubhpc.running.driver import run as run_study
 from rubhpc.running.plan import make_plan
-from rubhpc.running.recompute import reproduce
 from rubhpc.running.stopping import Stopping
 from rubhpc.schema import STATE, VARIABLES
 from rubhpc.storage.new_manifest import shard_of
@@ -201,12 +200,6 @@ def test_a_copy_of_the_manifest_with_other_content_is_named_and_repaired(store, 
     copy.write_bytes(content)
     assert verify(store).arrays == (copy.name,)
     assert rerun(store, packed) == 0
-
-
-def test_one_case_is_recomputed_and_compared(packed):
-    study = read_study(packed.with_name("tiny.toml"))
-    name = Store(packed).manifest.case_id(5)
-    assert "bit for bit" in reproduce(study, name).verdict
 
 
 def test_a_stopped_run_leaves_blocks_that_the_next_one_packs(store, packed, tmp_path):

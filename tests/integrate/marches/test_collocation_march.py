@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from closed_form import read_rig, simulate
 from contact_answers import masses
-from equal_stators import in_ring
 from independent_contact import run
 from record_distance import MOTIONS
 from reference_bodies import squared_slope
@@ -22,7 +21,6 @@ from rubhpc.integrate.marches import collocation
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.marches.march import ended_in
 from rubhpc.integrate.scheme import Scheme
-from rubhpc.recent import forget
 from rubhpc.rig.reading import with_keys
 from rubhpc.rig.stators import LumpedStator, MatrixStator
 
@@ -179,20 +177,6 @@ def test_closed_gaps_are_closed_and_forces_press(n_stator):
     assert np.median(abs(gap[:, :-1][before])) <= 1e-5 * 40e-6
 
 
-def test_forces_of_a_bent_ring_are_those_of_finer_steps():
-    """Eight bent stators under a whip, four of them closed at a time."""
-    packaged = with_keys(read_rig("mokhtar2017"), {"stator.geometry": "second_order"})
-    case = {"speed_ratio": 0.98, "clearance": "20 um", "friction": 0.3, "normal": "updated"}
-    case |= {"transient": 1, "revolutions": 1, "samples_per_revolution": 64, "keep": ("waveform",)}
-    ring = in_ring(packaged, 8)
-    fine, found = (simulate(ring, **case, accuracy=accuracy) for accuracy in (1e-5, 1e-3))
-    assert found.contact_fraction.sum() > 2.0
-    assert found.energy_residual < 1e-3
-    assert np.linalg.norm(found.contact_force - fine.contact_force) < 1e-3 * np.linalg.norm(
-        fine.contact_force
-    )
-
-
 def test_without_lateral_freedom_normals_turn_with_the_disc_alone():
     rig = trial_rig(2, lateral=False)
     given = CLOSE | {"normal": "updated"}
@@ -311,20 +295,6 @@ def test_friction_that_wedges_a_stator_ends_a_case(friction_law):
     given |= {"transient": 0, "revolutions": 3}
     assert simulate(rig, **given, friction=0.2).peak_contact_force[0] > 10.0
     assert "Painleve" in simulate(rig, **given, friction=0.8).reason
-
-
-def test_cases_before_change_no_bit():
-    """Tables that other cases have filled, and matrices of other contacts."""
-    given = CLOSE | {"normal": "updated", "friction_law": "coulomb", "keep": ("waveform",)}
-    alone = simulate(trial_rig(3), **given)
-    forget()
-    for clearance in ("60 um", "30 um"):
-        simulate(trial_rig(3), **given | {"clearance": clearance})
-    again = simulate(trial_rig(3), **given)
-    for name, signal in alone.signals.items():
-        assert again.signals[name].tobytes() == signal.tobytes(), name
-    assert again.steps == alone.steps
-    assert again.energy_residual == alone.energy_residual
 
 
 def test_a_force_that_only_turns_takes_long_steps():

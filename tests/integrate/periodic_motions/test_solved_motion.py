@@ -126,18 +126,6 @@ def test_rounding_leaves_displacements_and_velocities_as_exact_as_each_other():
     assert apart == pytest.approx(0.0, abs=2.0**-22)
 
 
-@pytest.mark.parametrize("size", [1e-3, 0.9, 1.0 - 1e-6, 1.0, 1.0 + 1e-6, 1.2])
-@pytest.mark.parametrize("angle", [0.0, 0.7, math.pi])
-def test_stable_are_multipliers_within_the_unit_circle(size, angle):
-    """Of a matrix of rank three, whose other multiplier lies well within."""
-    turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
-    matrix = np.zeros((5, 5))
-    matrix[:2, :2], matrix[2, 2] = size * turn, 0.3 * size
-    random = np.random.default_rng(1).standard_normal((5, 5))
-    approach = Approach(random @ matrix @ np.linalg.inv(random), np.ones(5))
-    assert approach.is_stable == (size < 1.0)
-
-
 def test_distances_are_the_energies_of_all_periods_to_come():
     """Of a matrix of low rank whose largest multipliers are a pair of modulus 0.97, in unlike components."""
     random, n = np.random.default_rng(5), 12
