@@ -8,6 +8,7 @@ import pytest
 from closed_form import Contact, read_rig, simulate
 from lone_bodies import body, set_up, set_up_modal, tip
 from set_ups import prepared
+from trial_rig import STEEL
 
 from rubhpc import Carrier, InputError, Load, LumpedStator, MatrixStator, Rig, assemble
 from rubhpc.fem.assemble import model_at
@@ -24,7 +25,6 @@ G = 9.81  # m/s2
 FAST = 50 * math.pi  # rad/s, 1500 rpm
 METHODS = ["modal", "central-difference"]
 WALL = tip(body(1.0, 1.0, ((1, "axial"),)), math.pi, axial=-1)  # below, and held
-STEEL = {"youngs_modulus": 2.1e11, "shear_modulus": 8e10, "density": 7800.0}
 
 
 def heavy(**keys):

@@ -13,13 +13,13 @@ import pytest
 from closed_form import simulate
 from independent_contact import run
 from record_distance import MOTIONS
+from trial_rig import STEEL
 
 from rubhpc.rig.parts import Bearing, Damping, Disc, ShaftSection, Torsion
 from rubhpc.rig.rig import Rig
 from rubhpc.rig.rotors import Rotor, Unbalance
 from rubhpc.rig.stators import Stator
 
-STEEL = {"youngs_modulus": 2.1e11, "shear_modulus": 8e10, "density": 7800.0}
 STEPPED = (
     ShaftSection(length=0.2, outer_diameter=0.020, elements=2, **STEEL),
     ShaftSection(length=0.2, outer_diameter=0.030, inner_diameter=0.012, elements=2, **STEEL),

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from closed_form import read_rig, simulate
+from trial_rig import turn
 
 from rubhpc import State
 from rubhpc.fem.assemble import assemble
@@ -59,15 +60,10 @@ def check_close(found, expected, share, name):
     assert found == pytest.approx(expected, rel=0, abs=share * abs(expected).max()), name
 
 
-def turn(record):
-    """Time of a revolution, s."""
-    return 2 * math.pi / abs(record.spin_speed)
-
-
 def test_steady_rub_at_subcritical_speed(steady):
     assert steady.period == 1
     found = {
-        "mean force": steady.contact_impulse[0] / turn(steady),
+        "mean force": steady.contact_impulse[0] / turn(steady.spin_speed),
         "peak force": steady.peak_contact_force[0],
         "vertical": steady.peak_to_peak_vertical,
         "horizontal": steady.peak_to_peak_horizontal,
@@ -93,7 +89,7 @@ def check_means(record, friction, lateral_stiffness):
 
     Samples are points, so sharp pulses of the stator alias: these take 1024 and more samples a revolution.
     """
-    force = record.contact_impulse[0] / turn(record)
+    force = record.contact_impulse[0] / turn(record.spin_speed)
     sense = np.sign(record.spin_speed)
     assert record.contact_force.mean() == pytest.approx(force, rel=1e-4)
     found = [

@@ -2,12 +2,12 @@
 
 import numpy as np
 from closed_form import run_up
+from trial_rig import STEEL
 
 from rubhpc import LumpedStator, Rig, Unbalance
 from rubhpc.rig.parts import Bearing, Damping, Disc, ShaftSection, Torsion
 from rubhpc.rig.rotors import Rotor
 
-STEEL = {"youngs_modulus": 2.1e11, "shear_modulus": 8e10, "density": 7800.0}
 END = {"kyy": 1e7, "kzz": 9e6, "cyy": 1e3, "czz": 1e3}
 
 

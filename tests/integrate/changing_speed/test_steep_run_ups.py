@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from closed_form import run_up
 from set_ups import prepared
+from trial_rig import STEEL
 
 from rubhpc import LumpedStator, Probe, Rig, Unbalance
 from rubhpc.fem.assemble import assemble, model_at
@@ -25,7 +26,6 @@ from rubhpc.study.initial import CONTACT_FREE, Initial
 from rubhpc.study.speed_law import SpeedLaw
 from rubhpc.study.study import Recording
 
-STEEL = {"youngs_modulus": 2.1e11, "shear_modulus": 8e10, "density": 7800.0}
 SPEEDS = (150.0, 260.0, 380.0, 520.0)  # rad/s
 PER_REVOLUTION, STEPS = 128, 8  # steps of the reference between samples
 RUB = {"clearance": 1.6e-4, "friction": 0.1}
