@@ -7,48 +7,12 @@ import time
 
 import pytest
 from running import run, start, stored_bytes
+from study_texts import BRANCHES, RUN_UPS
 
 from rubhpc.schema import INFERRED
 from rubhpc.storage.status import read_status
 from rubhpc.storage.verify import verify
 
-BRANCHES = """
-rig = "mokhtar2017"
-[grid]
-clearance = { start = "112 um", stop = "124 um" }
-speed_ratio = [0.73, 0.74, 0.75, 0.76]
-friction = 0.3
-[contact]
-model = "mokhtar2017"
-[branch]
-along = "clearance"
-periods = [1, 2]
-step = "4 um"
-sweeps = 1
-points = 60
-[record]
-transient = 40
-samples_per_revolution = 64
-"""
-RUN_UPS = """
-rig = "mokhtar2017"
-[run_up]
-start = "1800 rpm"
-stop = "1500 rpm"
-[grid]
-"run_up.time" = ["0.3 s", "0.5 s", "1.5 s"]
-clearance = ["100 um", "120 um", "5 mm"]
-friction = [0.1, 0.2]
-[contact]
-model = "mokhtar2017"
-[record]
-samples_per_revolution = 32
-[[record.probe]]
-name = "left"
-node = 1
-[run]
-block = 2
-"""
 DRIVES = """
 rig = "mokhtar2017"
 [drive]
@@ -122,8 +86,21 @@ seed = 1
 [run]
 block = 3
 """
-KINDS = {"branches": BRANCHES, "run_ups": RUN_UPS, "drives": DRIVES, "refined": REFINED, "slabs": SLABS}
-KINDS |= {"chains": CHAINS, "sample": SAMPLE}
+MORE_RUN_UPS = (
+    RUN_UPS.replace('"0.5 s"]', '"0.5 s", "1.5 s"]')
+    .replace('"5 mm"', '"120 um", "5 mm"')
+    .replace("friction = 0.2", "friction = [0.1, 0.2]")
+    .replace("block = 1", "block = 2")
+)
+KINDS = {
+    "branches": BRANCHES.replace("[0.74, 0.75]", "[0.73, 0.74, 0.75, 0.76]"),
+    "run_ups": MORE_RUN_UPS,
+    "drives": DRIVES,
+    "refined": REFINED,
+    "slabs": SLABS,
+    "chains": CHAINS,
+    "sample": SAMPLE,
+}
 
 
 @pytest.mark.parametrize(

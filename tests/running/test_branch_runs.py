@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 from matplotlib.figure import Figure
 from running import check_a_lost_chunk, study_of
+from study_texts import BRANCHES as STUDY
 
 import rubhpc
 from postproc.cases.reduction import reduce_store
@@ -24,26 +25,6 @@ from rubhpc.running.plan import make_plan
 from rubhpc.running.progress import Progress
 from rubhpc.running.sampled_cases import Enough, Trail
 from rubhpc.study.study import read_study
-
-STUDY = """
-title = "branches"
-rig = "mokhtar2017"
-[grid]
-clearance = { start = "112 um", stop = "124 um" }
-speed_ratio = [0.74, 0.75]
-friction = 0.3
-[contact]
-model = "mokhtar2017"
-[branch]
-along = "clearance"
-periods = [1, 2]
-step = "4 um"
-sweeps = 1
-points = 60
-[record]
-transient = 40
-samples_per_revolution = 64
-"""
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,7 @@ import pytest
 import running
 import xarray as xr
 from running import check_a_lost_chunk
+from study_texts import RUN_UPS as STUDY
 
 import rubhpc
 from postproc.cases.reduction import reduce_store
@@ -24,28 +25,6 @@ from rubhpc.errors import InputError, StoreError
 from rubhpc.running.plan import make_plan
 from rubhpc.running.recompute import reproduce
 from rubhpc.storage.store import Store
-
-STUDY = """
-rig = "mokhtar2017"
-[run_up]
-start = "1800 rpm"
-stop = "1500 rpm"
-[grid]
-"run_up.time" = ["0.3 s", "0.5 s"]
-clearance = ["100 um", "5 mm"]
-friction = 0.2
-[contact]
-model = "mokhtar2017"
-[record]
-samples_per_revolution = 32
-[[record.probe]]
-name = "left"
-node = 1
-angle = "-45 deg"
-[run]
-block = 1
-"""
-
 
 study_of = partial(running.study_of, output="run_ups.zarr")
 
