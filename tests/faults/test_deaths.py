@@ -98,9 +98,9 @@ def store(tmp_path: Path) -> Store:
     return Store(tmp_path / "tiny.zarr")
 
 
-def die(store: Store, flat: int, run_number: int = 1) -> InProgress:
+def die(store: Store, flat: int) -> InProgress:
     """Leave the record of a rank that died in a case."""
-    progress = InProgress(store.in_progress_directory, run_number, "rank00000")
+    progress = InProgress(store.in_progress_directory, 1, "rank00000")
     progress.take(flat, store.manifest.case_id(flat))
     return progress
 

@@ -21,9 +21,9 @@ APART = {"clearance": 5e-3, "friction": 0.1}
 RUB = {"clearance": 1.4e-4, "friction": 0.2, "model": "mokhtar2017", "speed": SPIN}
 
 
-def with_harmonics(forces=FORCES, name="mokhtar2017"):
-    rig = read_rig(name)
-    return replace(rig, rotor=replace(rig.rotor, harmonic=forces))
+def with_harmonics():
+    rig = read_rig("mokhtar2017")
+    return replace(rig, rotor=replace(rig.rotor, harmonic=FORCES))
 
 
 def receptance(model, force, spin, row):

@@ -25,9 +25,9 @@ METHODS = {"modal": Integrator(), "central": Integrator(method="central-differen
 SHORT = {"transient": 0, "revolutions": 4, "samples_per_revolution": 64, "friction": 0.1}
 
 
-def setup_of(method: str, n_stator: int = 2):
+def setup_of(method: str):
     return prepare(
-        trial_rig(n_stator),
+        trial_rig(2),
         SPIN,
         contact=Contact(),
         integrator=METHODS[method],

@@ -49,10 +49,10 @@ def physics(monkeypatch: pytest.MonkeyPatch) -> Physics:
     return Distinct().put_in(monkeypatch)
 
 
-def make_study(folder: Path, name: str = "parts.zarr", friction: list[float] = FRICTIONS) -> Study:
+def make_study(folder: Path, friction: list[float] = FRICTIONS) -> Study:
     """28 cases in 12 blocks."""
     return read_study(
-        write_study(folder, output=folder / name, friction=friction, block=3, keep='["section"]')
+        write_study(folder, output=folder / "parts.zarr", friction=friction, block=3, keep='["section"]')
     )
 
 

@@ -20,7 +20,7 @@ def below(**given):
     return LumpedStator(node=1, angle=math.pi, radius=1.0, **given)
 
 
-def run(rig, duration, samples, *, clearance=SMALL, friction=0.0, displacement=0.0, velocity=0.0, **given):
+def run(rig, duration, samples, *, clearance=SMALL, displacement=0.0, velocity=0.0, **given):
     """A record of one revolution; every degree of the rotor begins with this displacement and velocity."""
     rest = State.at_rest(assemble(rig))
     n_dof = rest.rotor_displacement.size
@@ -35,7 +35,7 @@ def run(rig, duration, samples, *, clearance=SMALL, friction=0.0, displacement=0
         rig,
         speed=2 * math.pi / duration,
         clearance=clearance,
-        friction=friction,
+        friction=0.0,
         initial=initial,
         transient=0,
         revolutions=1,

@@ -20,7 +20,7 @@ SCHEMES = {  # in steps of 0.5 us
 }
 
 
-def computed(name, scheme, friction_law="coulomb"):
+def computed(name, scheme):
     """The motion, (N_SAMPLE, 3 + 2 q), and its record, which is longer where a revolution is."""
     per_revolution, friction, restitution, angles, unbalance, velocity = CASES[name]
     spin = spin_of(per_revolution)
@@ -32,7 +32,7 @@ def computed(name, scheme, friction_law="coulomb"):
         mount = body(one["mass"] * np.eye(2), np.diag(one["stiffness"]), ((1, "axial"), (1, "lateral")))
         mount = replace(mount, damping=np.diag(one["damping"]))
         tips.append(tip(mount, angle, radius=RADIUS, lateral=1))
-    contact = Contact(friction_law=friction_law, restitution=restitution or None)
+    contact = Contact(friction_law="coulomb", restitution=restitution or None)
     force = unbalance * spin**2 * np.array([1.0, -1.0j, 0.0])
     setup = SCHEMES[scheme](disc, tips, spin, per_revolution, contact, force=force)
     record = run_case(

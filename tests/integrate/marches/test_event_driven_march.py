@@ -45,8 +45,8 @@ FORGET = ModeLibrary.forget
 COUNTED = ("contacts_per_revolution", "contact_fraction", "contact_impulse", "peak_contact_force")
 
 
-def check_close(found, expected, share, names=MOTIONS):
-    for name in names:
+def check_close(found, expected, share):
+    for name in MOTIONS:
         one, other = getattr(found, name), getattr(expected, name)
         assert one == pytest.approx(other, rel=0, abs=share * abs(other).max()), name
 

@@ -26,12 +26,12 @@ def steps(sizes):
     return np.repeat(sizes, SAMPLES)
 
 
-def logistic(rate, start, n=REVOLUTIONS):
-    """The logistic map, 100 iterations after its beginning."""
+def logistic(start):
+    """The logistic map of rate 4, 100 iterations after its beginning."""
     sizes = [start]
-    for _ in range(100 + n - 1):
-        sizes.append(rate * sizes[-1] * (1 - sizes[-1]))
-    return np.array(sizes[-n:])
+    for _ in range(100 + REVOLUTIONS - 1):
+        sizes.append(4.0 * sizes[-1] * (1 - sizes[-1]))
+    return np.array(sizes[-REVOLUTIONS:])
 
 
 def of(whirl, *, torsion=None, impulse=None, is_contact=True, others=()):
@@ -57,7 +57,7 @@ STEADY = {
     "torus of a slow beat": CIRCLE + 0.3 * np.exp(1.05j * TURN),
     "period 1 by a weak torus": CIRCLE + 0.006 * np.exp(1j * GOLDEN * TURN),
     "period 20": CIRCLE + 0.3 * np.exp(1.05j * TURN) + 0.1 * np.exp(2.1j * TURN),
-    **{f"chaos from {x}": CIRCLE * (1 + steps(logistic(4.0, x))) for x in np.linspace(0.1, 0.9, 9)},
+    **{f"chaos from {x}": CIRCLE * (1 + steps(logistic(x))) for x in np.linspace(0.1, 0.9, 9)},
 }
 MOVING = {
     **{f"decay, half-life {n}": CIRCLE * (1 + 0.6 * decay(n)) for n in (4, 10, 30, 100)},
@@ -65,7 +65,7 @@ MOVING = {
     "torus that shrinks": CIRCLE + 0.3 * decay(20) * np.exp(1j * GOLDEN * TURN),
     "torus that grows": CIRCLE + 0.02 / decay(15) * np.exp(1j * GOLDEN * TURN),
     "torus that drifts": CIRCLE * (1 + AGE / REVOLUTIONS) + 0.1 * np.exp(1j * GOLDEN * TURN),
-    "chaos that drifts": CIRCLE * (1 + 0.2 * steps(logistic(4.0, 0.3)) + 3 * AGE / REVOLUTIONS),
+    "chaos that drifts": CIRCLE * (1 + 0.2 * steps(logistic(0.3)) + 3 * AGE / REVOLUTIONS),
     "orbit whose centre drifts": CIRCLE + 0.5 * AGE / REVOLUTIONS,
 }
 
