@@ -71,8 +71,9 @@ def test_links_that_lead_back_to_themselves(store, finished):
         assert repaired_by_run(store, finished) == n_case
 
 
-def test_a_run_sees_a_deleted_chunk_by_itself(store, finished):
-    Store(store).chunk_files((1, 0, 0))[4].unlink()
+@pytest.mark.parametrize("lose", [Path.unlink, lambda path: path.write_bytes(b"")], ids=["deleted", "empty"])
+def test_a_run_sees_a_lost_chunk_by_itself(store, finished, lose):
+    lose(Store(store).chunk_files((1, 0, 0))[4])
     assert repaired_by_run(store, finished) == 2
 
 

@@ -16,7 +16,7 @@ from rubhpc.schema import DONE, FAILED, FINAL_STATE, MISSING, STATE, VARIABLES
 from rubhpc.storage import layout
 from rubhpc.storage.disk import disk_errors, write_whole
 from rubhpc.storage.journal import Entry
-from rubhpc.storage.resume import bring_up_to_date, cases_without_files, differences, grid_for, open_store
+from rubhpc.storage.resume import bring_up_to_date, differences, grid_for, open_store
 from rubhpc.storage.store import Store, case_checksum
 from rubhpc.study.cases import CaseGrid
 from rubhpc.study.study import read_study
@@ -96,20 +96,6 @@ def test_only_what_is_kept_has_arrays(tmp_path):
     assert "revolution" in ds.coords  # though nothing here lies along it
 
 
-def test_a_block_is_one_chunk_of_every_array_and_comes_back(store):
-    start = (1, 0, 2)  # at the edge: the last block along friction is half empty
-    assert store.manifest.chunk == (1, 1, 2)
-    data = fill(store, start)
-    assert data["vertical"].shape == (1, 64)
-    assert all(path.stat().st_size for path in store.chunk_files(start))
-    ds = xr.open_zarr(store.path)
-    for name, values in data.items():
-        np.testing.assert_array_equal(ds[name].values[1, 0, 2], values[0])
-        assert np.isnan(ds[name].values[1, 0, :2]).all()
-    read = store.read_block(start)
-    assert all(read[name].tobytes() == values.tobytes() for name, values in data.items())
-
-
 def test_a_chunk_is_written_as_zarr_writes_it(store):
     """Blocks are encoded without zarr, which takes three times as long; the files have to be the same."""
     for start in ((0, 1, 0), (1, 0, 2)):  # the latter at the edge
@@ -121,14 +107,6 @@ def test_a_chunk_is_written_as_zarr_writes_it(store):
             window = store.window(start)
             array_of(store.path, name)[window] = values.reshape(1, 1, -1, *values.shape[1:])
         assert [path.read_bytes() for path in store.chunk_files(start)] == ours
-
-
-def test_blocks_and_flat_indices_are_those_of_the_sweep(study, store):
-    case_grid = CaseGrid(study)
-    for block in case_grid.blocks():
-        shape = store.manifest.shape
-        expected = [np.ravel_multi_index(case.index, shape) for case in case_grid.cases(block)]
-        assert store.flat(block.start).tolist() == expected
 
 
 def test_metrics_are_packed_from_the_journals(store):
@@ -260,15 +238,6 @@ def test_a_draft_is_removed_by_the_next_run_though_the_store_is_there(study, sto
         (draft / "zarr.json").write_text("{}")
     bring_up_to_date(store, CaseGrid(study))
     assert not any(draft.exists() for draft in drafts)
-
-
-def test_gone_and_empty_files_are_found(store):
-    for start in ((0, 0, 0), (0, 1, 0), (1, 1, 0)):
-        journal(store, start, fill(store, start))
-    store.chunk_files((0, 1, 0))[3].unlink()
-    store.chunk_files((1, 1, 0))[0].write_bytes(b"")
-    expected = [*store.flat((0, 1, 0)).tolist(), *store.flat((1, 1, 0)).tolist()]
-    assert cases_without_files(store, store.replay()) == expected
 
 
 def change_byte(path: Path, at: int) -> None:
