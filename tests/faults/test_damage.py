@@ -77,18 +77,6 @@ def test_a_run_sees_a_lost_chunk_by_itself(store, finished, lose):
     assert repaired_by_run(store, finished) == 2
 
 
-def test_the_journal_is_cut_short(store, finished):
-    (path,) = (store / ".rubhpc" / "journal").iterdir()
-    lines = path.read_bytes().splitlines(keepends=True)
-    path.write_bytes(b"".join(lines[:-2]) + lines[-2][:50])
-    lost = {int(line.split()[1]) for line in lines[-2:]}
-    assert named_by_verify(store) == {
-        tuple(int(i) for i in np.unravel_index(flat, (2, 2, 3))) for flat in lost
-    }
-    # The line cut short stays in its file; two new ones come.
-    assert repaired_by_run(store, finished) == 2
-
-
 def test_a_line_of_the_journal_is_changed(store, finished):
     (path,) = (store / ".rubhpc" / "journal").iterdir()
     lines = path.read_bytes().splitlines(keepends=True)

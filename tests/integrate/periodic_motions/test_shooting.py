@@ -1,16 +1,14 @@
 """Why a search for a periodic motion ends without one."""
 
 from functools import partial
-from types import SimpleNamespace
 
-import numpy as np
 import pytest
 from closed_form import periodic, read_rig, simulate
 from equal_stators import in_ring
 
 from rubhpc.errors import NoPeriodicMotion
 from rubhpc.integrate import periodic_motion
-from rubhpc.integrate.periodic_motions.shooting import NEAR_GRAZING, _grazing, shoot
+from rubhpc.integrate.periodic_motions.shooting import shoot
 
 CASE = {"speed_ratio": 0.75, "clearance": "84 um", "friction": 0.3, "transient": 5, "keep": ()}
 
@@ -41,20 +39,6 @@ def test_motion_that_the_last_step_closes_is_found(monkeypatch):
                 periodic("mokhtar2017", **CASE)
         else:
             assert periodic("mokhtar2017", **CASE).iterations == needed
-
-
-def test_contact_that_grazes_is_named():
-    """A touch that is slow beside spin times clearance, not one from beyond a wall."""
-
-    def trial(*speeds):
-        pieces = [SimpleNamespace(touching=np.array([0]), approach=np.array([speed])) for speed in speeds]
-        return [SimpleNamespace(pieces=pieces)]
-
-    usual = np.array([0.01])
-    assert _grazing(trial(0.4, 0.3 * NEAR_GRAZING * 0.01), usual) == (
-        ": a contact grazes, its speed of approach is 3e-05 m/s"
-    )
-    assert _grazing(trial(0.4, 0.3), usual) == _grazing(trial(-1e-5), usual) == _grazing(trial(), usual) == ""
 
 
 @pytest.mark.parametrize(
