@@ -122,8 +122,7 @@ SLOW = (
     "validation/",
 )
 # `make faults` or `make validation` has these. Of most claims `make test` has another, by other parameters or
-# in a shorter form; of these it has none: STOP on ranks, kills of workers in a refined map and of chains on
-# ranks, dense rings.
+# in a shorter form; of these it has none: STOP on ranks, kills of workers in a refined map, dense rings.
 LONG = (
     "commands/test_modes_command.py::test_figure_is_written_in_the_format_of_its_name[png]",
     "faults/test_damage.py::test_what_is_no_case_is_written_anew_without_computing[period]",

@@ -18,9 +18,7 @@ from running import array_of, killed_after, shards, write_study
 
 from rubhpc.errors import StoreError
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING
-from rubhpc.storage.growth import origins
 from rubhpc.storage.journal import Entry, next_run
-from rubhpc.storage.new_manifest import manifest_of
 from rubhpc.storage.regular_files import RegularFiles
 from rubhpc.storage.resume import bring_up_to_date, grid_for, open_store
 from rubhpc.storage.store import Store, case_checksum
@@ -282,12 +280,3 @@ def test_another_version_of_the_physics_is_refused_unless_it_is_accepted(tmp_pat
     assert compute(store) == 0
     assert xr.open_zarr(study.output).attrs["accepted_physics"] == [old]
     assert grid_for(study).identity == Store(study.output).manifest.identity
-
-
-def test_origins_show_where_each_case_was(tmp_path):
-    grid = {"speed_ratio": [0.9, 2.0], "clearance_ratio": [0.7], "friction": [0.1, 0.3]}
-    before, after = (
-        manifest_of(grid_for(make_study(tmp_path, g)))
-        for g in (grid, {**grid, "speed_ratio": [2.0, 1.0, 0.9], "friction": [0.2, 0.3, 0.1]})
-    )
-    assert origins(before, after).tolist() == [-1, 3, 2, -1, -1, -1, -1, 1, 0]
