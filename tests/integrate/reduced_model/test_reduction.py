@@ -14,6 +14,7 @@ from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.response import steady_response
 from rubhpc.integrate.packing import degrees_of, output_degrees
+from rubhpc.integrate.reduced_model.coupling import Grouped, coupled_rows
 from rubhpc.integrate.reduced_model.reduction import reduce_model
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL
 from rubhpc.rig.parts import Damping, Torsion
@@ -165,6 +166,22 @@ def test_answers_of_a_ring_reduced_body_by_body(n_stator):
             np.isin(np.concatenate([degrees_of(model).ravel(), output_degrees(model)]), apart)
         )
         assert np.diag(found)[own] == pytest.approx(np.diag(full)[own], rel=1e-4)
+
+
+def test_products_group_by_group():
+    rng = np.random.default_rng(5)
+    sizes, widths = (4, 3, 3, 1), (2, 3, 3, 1)
+    matrix = block_diag(*(rng.normal(size=(n, n)) for n in sizes))
+    columns = block_diag(*(rng.normal(size=(n, m)) for n, m in zip(sizes, widths, strict=True)))
+    mixed = rng.permutation(len(matrix))
+    matrix, columns = matrix[np.ix_(mixed, mixed)], columns[mixed]
+    groups = coupled_rows(matrix != 0.0)
+    assert sorted(map(len, groups)) == sorted(sizes)
+    assert [rows[0] for rows in groups] == sorted(rows[0] for rows in groups)
+    for those in (groups, [np.arange(len(matrix))]):
+        grouped = Grouped(those, columns)
+        assert grouped.under(matrix) == pytest.approx(matrix @ columns)
+        assert grouped.form(matrix) == pytest.approx(columns.T @ matrix @ columns)
 
 
 def test_a_bent_stator_follows_an_axial_force_along_all_its_length():
