@@ -10,6 +10,7 @@ import subprocess
 import time
 from pathlib import Path
 
+import xarray as xr
 from running import (
     command,
     complaint,
@@ -51,6 +52,8 @@ def test_poisoned_cases_fail_and_the_others_finish(tmp_path, launcher):
             (DONE, None) if friction == 0.1 else (FAILED, reasons[friction])
         )
     assert not verify(tmp_path / "tiny.zarr")
+    stored = xr.open_zarr(tmp_path / "tiny.zarr")
+    assert (stored.torsion.isnull().all("sample") == (stored.status == FAILED)).all()
     healthy = run(study, "--retry-failed")
     assert healthy.returncode == 0, healthy.stderr
     assert "8 done; 6 computed" in healthy.stdout

@@ -12,9 +12,10 @@ import pytest
 from rubhpc.running import plan, sampled_cases
 from rubhpc.running.case_setup import MOST_BYTES
 from rubhpc.running.plan import make_plan
-from rubhpc.running.sampled_cases import CaseTimer, Sample, Timed, Trail, in_spread_order
+from rubhpc.running.sampled_cases import CaseTimer, Sample, Timed, Trail, in_spread_order, memory, part_of
 from rubhpc.storage.duration import span
 from rubhpc.study.cases import CaseGrid
+from rubhpc.study.speed_law import SpeedLaw
 from rubhpc.study.study import read_study
 from tests.support.running import write_study
 
@@ -252,3 +253,15 @@ def test_memory_holds_other_set_ups_of_a_ring(tmp_path, monkeypatch):
 )
 def test_span_of_time_has_one_unit(least, most, text):
     assert span(least, most) == text
+
+
+def test_part_of_a_run_up_has_its_speeds():
+    law = SpeedLaw(time=(0.0, 4.0, 10.0), speed=(50.0, 300.0, 100.0))
+    part = part_of(law, 100, 116)
+    assert part.n_revolution == 16
+    assert part.speed[0] == pytest.approx(law.at_angle(2 * np.pi * np.array([100.0]))[1][0])
+
+
+def test_memory_is_that_of_this_process():
+    held = np.ones(20_000_000)
+    assert held.nbytes < memory() <= 1.01 * memory("VmHWM:") < 1e12

@@ -3,8 +3,12 @@
 import pytest
 from closed_form import periodic, simulate
 from overhung_pump import pump
+from set_ups import prepared
+from trial_rig import trial_rig
 
+from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.periodic_motions import proof
+from rubhpc.integrate.periodic_motions.piecewise_motion import PiecewiseMotion
 from rubhpc.schema import REGIME
 
 TWICE = {
@@ -60,3 +64,37 @@ def test_chaos_that_dies_out_has_not_settled(revolutions):
     if revolutions < 128:  # it dies out soon after the others end
         assert record.lyapunov_exponent > 0.05
     assert record.peak_contact_force[0] > 2.0 * reached.peak_contact_force[0]
+
+
+@pytest.mark.parametrize(
+    ("count", "many", "looks", "expected"),
+    [
+        (2, 6, (False, False), 512),
+        (2, 6, (False, True), 1536),
+        (3, 6, (False, False), 128),
+        (3, 6, (False, True), 512),
+        (3, 3, (False, False), 0),
+        (3, 3, (False, True), 128),
+        (3, 3, (True, False), 512),
+    ],
+)
+def test_revolutions_of_many_pairs_are_followed_less_far(monkeypatch, count, many, looks, expected):
+    given = {"clearance": 80e-6, "friction": 0.2, "samples_per_revolution": 64}
+    record = simulate(trial_rig(count), speed=170.0, transient=2, revolutions=1, keep=(), **given)
+    setup = prepared(trial_rig(count), 170.0)
+    passed, on = [], EventDrivenMarch.pass_sections
+
+    def counted(march, n_revolution, *args):
+        passed.append(n_revolution)
+        return on(march, n_revolution, *args)
+
+    monkeypatch.setattr(EventDrivenMarch, "pass_sections", counted)
+    monkeypatch.setattr(proof, "MANY_PAIRS", many)
+
+    def motion_of(state, march):
+        return PiecewiseMotion(setup, 80e-6, 0.2, state, march)
+
+    solver = proof.Solver(motion_of, record.final)
+    list(solver.later(*looks))
+    assert sum(passed) == expected
+    assert (0 if solver.followed is None else solver.followed[0].size) == expected
