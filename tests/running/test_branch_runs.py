@@ -170,18 +170,6 @@ def test_keys_of_contact_are_not_followed(tmp_path):
         read_study(tmp_path / "study.toml")
 
 
-def test_a_case_says_how_far_it_has_come(store, monkeypatch):
-    said = []
-    monkeypatch.setattr(Progress, "say", lambda self, doing: said.append(doing))
-    shutil.copytree(store, store / "again")
-    path = store / "again" / "branches.zarr"
-    next(file for file in sorted((path / "point_value" / "c").rglob("*")) if file.is_file()).unlink()
-    rubhpc.run(read_study(store / "again" / "study.toml", path), quiet=True)
-    assert said[-1] == ""
-    assert any(text.startswith("20 motions of branches found, now at clearance=1") for text in said)
-    assert any(" points recorded; branches: " in text for text in said)
-
-
 def test_another_range_is_another_study(store, tmp_path):
     shutil.copytree(store / "branches.zarr", tmp_path / "branches.zarr")
     (tmp_path / "study.toml").write_text(STUDY.replace("124 um", "125 um"))
