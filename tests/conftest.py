@@ -72,6 +72,7 @@ SLOW = (
     "integrate/reduced_model/test_truncation.py::test_contacts_that_feel_motion_along_the_rim_need_more_modes",
     "integrate/test_periodic.py::test_failure_says_why",
     "integrate/measuring/test_regimes_lyapunov.py",
+    "integrate/changing_speed/test_filled_modes.py",
     "integrate/changing_speed/test_run_up.py",
     "integrate/changing_speed/test_run_up_machines.py",
     "integrate/changing_speed/test_steep_run_ups.py",
