@@ -43,6 +43,13 @@ _EXAMPLES = {
     "rad": '"90 deg"',
     "rad/s": '"1800 rpm"',
     "Hz": '"31.56 Hz"',
+    "N/m": '"1e6 N/m"',
+    "N s/m": '"100 N s/m"',
+    "N m/rad": '"5e3 N m/rad"',
+    "N m s/rad": '"5 N m s/rad"',
+    "kg m^2": '"0.01 kg m^2"',
+    "kg*m^2": '"0.01 kg m^2"',
+    "kg/m^3": "7800.0",
     "": "0.3",
 }
 
@@ -174,16 +181,16 @@ def _angles(units: Any) -> float:
     return float(root._units.get("radian", 0))
 
 
-def example(unit: str) -> str:
+def example_of(unit: str) -> str:
     """Return how a value of that unit may be written in a file."""
     return _EXAMPLES.get(unit) or f'"1.5 {unit}"'
 
 
 def _fix(unit: str) -> str:
     return (
-        f"write a number ({unit}) or text such as {example(unit)}"
+        f"write a number ({unit}) or text such as {example_of(unit)}"
         if unit
-        else f"write a number such as {example(unit)}"
+        else f"write a number such as {example_of(unit)}"
     )
 
 

@@ -53,12 +53,11 @@ class Tube:
     poissons_ratio: float | None = quantity(
         "",
         doc="Poisson's ratio, in place of the shear modulus E / (2 (1 + nu)).",
-        example="0.3",
         default=None,
         above=-1,
         below=0.5,
     )
-    density: float = quantity("kg/m^3", doc="Density.", example="7800.0", above=0)
+    density: float = quantity("kg/m^3", doc="Density.", above=0)
     shear: bool = flag(
         doc="Whether it deforms in shear (Timoshenko beam); false for a Rayleigh beam.",
         example="true",
@@ -115,7 +114,7 @@ class Damping:
         "s", doc="Stiffness-proportional coefficient.", example='"20 us"', default=0.0, at_least=0
     )
     ratios: tuple[tuple[float, float], ...] = pairs(
-        ("Hz", ""),
+        units=("Hz", ""),
         doc="Damping ratios at given frequencies (Hz = fraction of critical), in place of alpha and beta.",
         example="{ 31.56 = 0.09, 128.05 = 0.022 }",
     )
@@ -188,7 +187,7 @@ class Disc(Placed):
     thickness: float | None = quantity(
         "m", doc="Thickness along the shaft.", example='"0.03 m"', default=None, above=0
     )
-    density: float | None = quantity("kg/m^3", doc="Density.", example="7800.0", default=None, above=0)
+    density: float | None = quantity("kg/m^3", doc="Density.", default=None, above=0)
     mass: float | None = quantity(
         "kg",
         doc="Mass, given with both inertias in place of thickness and density.",
@@ -197,10 +196,10 @@ class Disc(Placed):
         at_least=0,
     )
     diametral_inertia: float | None = quantity(
-        "kg m^2", doc="Moment of inertia about a diameter.", example="2.58e-3", default=None, at_least=0
+        "kg m^2", doc="Moment of inertia about a diameter.", default=None, at_least=0
     )
     polar_inertia: float | None = quantity(
-        "kg m^2", doc="Moment of inertia about the shaft axis.", example="4.76e-3", default=None, at_least=0
+        "kg m^2", doc="Moment of inertia about the shaft axis.", default=None, at_least=0
     )
 
     def __post_init__(self) -> None:
@@ -263,14 +262,10 @@ class Torsion:
     fixed_node: int | None = count(doc="Node whose torsion the drive constrains.", example="1", default=None)
     node: int = count(doc="Node of the spring to ground.", example="1", default=1)
     stiffness: float | None = quantity(
-        "N m/rad",
-        doc="Torsional spring to ground, in place of fixed_node.",
-        example="5e3",
-        default=None,
-        above=0,
+        "N m/rad", doc="Torsional spring to ground, in place of fixed_node.", default=None, above=0
     )
     damping: float = quantity(
-        "N m s/rad", doc="Torsional damper parallel to the spring.", example="0.1", default=0.0, at_least=0
+        "N m s/rad", doc="Torsional damper parallel to the spring.", default=0.0, at_least=0
     )
     free: bool = flag(doc="Whether the shaft is unconstrained in torsion.", example="true", default=False)
 

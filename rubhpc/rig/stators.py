@@ -47,9 +47,7 @@ class Seat:
         default=None,
     )
     node: int = count(doc="Node of the rotor that the stator faces, from 1.", example="8")
-    angle: float = quantity(
-        "rad", doc="Angle from straight up (+y) towards +z.", example='"90 deg"', default=0.0
-    )
+    angle: float = quantity("rad", doc="Angle from straight up (+y) towards +z.", default=0.0)
     radius: float | None = quantity(
         "m",
         doc="Contact radius; by default that of the largest disc at the node.",
@@ -146,10 +144,8 @@ class Stator(Seat):
     elements: int = count(
         doc="Number of equal finite elements.", example="6", default=6, at_most=MOST_ELEMENTS
     )
-    youngs_modulus: float = quantity("Pa", doc="Young's modulus.", example='"3 GPa"', above=0)
-    poissons_ratio: float = quantity(
-        "", doc="Poisson's ratio.", example="0.3", default=0.3, above=-1, below=0.5
-    )
+    youngs_modulus: float = quantity("Pa", doc="Young's modulus.", above=0)
+    poissons_ratio: float = quantity("", doc="Poisson's ratio.", default=0.3, above=-1, below=0.5)
     density: float = quantity("kg/m^3", doc="Density.", example="1157.0", above=0)
     lateral: bool = flag(
         doc="Whether the stator bends in the tangential direction.", example="true", default=True
@@ -226,27 +222,15 @@ class LumpedStator(Seat):
     mass: float | None = quantity(
         "kg", doc="Mass in the radial direction.", example='"0.5 g"', default=None, above=0
     )
-    stiffness: float | None = quantity(
-        "N/m", doc="Radial stiffness.", example='"1.9e6 N/m"', default=None, above=0
-    )
-    damping: float = quantity("N s/m", doc="Radial damping.", example='"2 N s/m"', default=0.0, at_least=0)
+    stiffness: float | None = quantity("N/m", doc="Radial stiffness.", default=None, above=0)
+    damping: float = quantity("N s/m", doc="Radial damping.", default=0.0, at_least=0)
     lateral_mass: float | None = quantity(
-        "kg",
-        doc="Mass in the tangential direction; by default `mass`.",
-        example='"0.5 g"',
-        default=None,
-        above=0,
+        "kg", doc="Mass in the tangential direction; by default `mass`.", default=None, above=0
     )
     lateral_stiffness: float | None = quantity(
-        "N/m",
-        doc="Tangential stiffness; without it the stator moves only radially.",
-        example='"1e4 N/m"',
-        default=None,
-        above=0,
+        "N/m", doc="Tangential stiffness; without it the stator moves only radially.", default=None, above=0
     )
-    lateral_damping: float = quantity(
-        "N s/m", doc="Tangential damping.", example='"0.1 N s/m"', default=0.0, at_least=0
-    )
+    lateral_damping: float = quantity("N s/m", doc="Tangential damping.", default=0.0, at_least=0)
     rigid: bool = flag(
         doc="Whether the stator is a rigid wall, without mass and stiffness.", example="true", default=False
     )
@@ -333,29 +317,19 @@ class Bore(Seat):
     stiffness: float | None = quantity(
         "N/m",
         doc="Stiffness of its support in both lateral directions, in place of stiffness_y and stiffness_z.",
-        example='"1e7 N/m"',
         default=None,
         above=0,
     )
-    stiffness_y: float | None = quantity(
-        "N/m", doc="Vertical stiffness.", example='"1e7 N/m"', default=None, above=0
-    )
-    stiffness_z: float | None = quantity(
-        "N/m", doc="Horizontal stiffness.", example='"8e6 N/m"', default=None, above=0
-    )
+    stiffness_y: float | None = quantity("N/m", doc="Vertical stiffness.", default=None, above=0)
+    stiffness_z: float | None = quantity("N/m", doc="Horizontal stiffness.", default=None, above=0)
     damping: float | None = quantity(
         "N s/m",
         doc="Damping of its support in both directions, in place of damping_y and damping_z.",
-        example='"300 N s/m"',
         default=None,
         at_least=0,
     )
-    damping_y: float | None = quantity(
-        "N s/m", doc="Vertical damping.", example='"300 N s/m"', default=None, at_least=0
-    )
-    damping_z: float | None = quantity(
-        "N s/m", doc="Horizontal damping.", example='"300 N s/m"', default=None, at_least=0
-    )
+    damping_y: float | None = quantity("N s/m", doc="Vertical damping.", default=None, at_least=0)
+    damping_z: float | None = quantity("N s/m", doc="Horizontal damping.", default=None, at_least=0)
     rigid: bool = flag(
         doc="Whether the hole is fixed to the ground or to its carrier, without mass and stiffness.",
         example="true",

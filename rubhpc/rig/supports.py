@@ -44,12 +44,8 @@ class Masses:
         default=None,
         at_least=0,
     )
-    myy: float | None = quantity(
-        "kg", doc="Mass in vertical motion.", example='"2 kg"', default=None, at_least=0
-    )
-    mzz: float | None = quantity(
-        "kg", doc="Mass in horizontal motion.", example='"2 kg"', default=None, at_least=0
-    )
+    myy: float | None = quantity("kg", doc="Mass in vertical motion.", default=None, at_least=0)
+    mzz: float | None = quantity("kg", doc="Mass in horizontal motion.", default=None, at_least=0)
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -73,41 +69,23 @@ class Springs(Masses):
     stiffness: float | None = quantity(
         "N/m",
         doc="Stiffness in both lateral directions, in place of kyy, kzz, kyz and kzy.",
-        example='"1e6 N/m"',
         default=None,
         at_least=0,
     )
-    kyy: float | None = quantity(
-        "N/m", doc="Vertical stiffness.", example='"1e6 N/m"', default=None, at_least=0
-    )
-    kzz: float | None = quantity(
-        "N/m", doc="Horizontal stiffness.", example='"1e6 N/m"', default=None, at_least=0
-    )
-    kyz: float = quantity(
-        "N/m", doc="Vertical force per horizontal displacement.", example='"2e5 N/m"', default=0.0
-    )
-    kzy: float = quantity(
-        "N/m", doc="Horizontal force per vertical displacement.", example='"-2e5 N/m"', default=0.0
-    )
+    kyy: float | None = quantity("N/m", doc="Vertical stiffness.", default=None, at_least=0)
+    kzz: float | None = quantity("N/m", doc="Horizontal stiffness.", default=None, at_least=0)
+    kyz: float = quantity("N/m", doc="Vertical force per horizontal displacement.", default=0.0)
+    kzy: float = quantity("N/m", doc="Horizontal force per vertical displacement.", default=0.0)
     damping: float | None = quantity(
         "N s/m",
         doc="Damping in both lateral directions, in place of cyy, czz, cyz and czy.",
-        example='"100 N s/m"',
         default=None,
         at_least=0,
     )
-    cyy: float | None = quantity(
-        "N s/m", doc="Vertical damping.", example='"100 N s/m"', default=None, at_least=0
-    )
-    czz: float | None = quantity(
-        "N s/m", doc="Horizontal damping.", example='"100 N s/m"', default=None, at_least=0
-    )
-    cyz: float = quantity(
-        "N s/m", doc="Vertical force per horizontal velocity.", example='"20 N s/m"', default=0.0
-    )
-    czy: float = quantity(
-        "N s/m", doc="Horizontal force per vertical velocity.", example='"20 N s/m"', default=0.0
-    )
+    cyy: float | None = quantity("N s/m", doc="Vertical damping.", default=None, at_least=0)
+    czz: float | None = quantity("N s/m", doc="Horizontal damping.", default=None, at_least=0)
+    cyz: float = quantity("N s/m", doc="Vertical force per horizontal velocity.", default=0.0)
+    czy: float = quantity("N s/m", doc="Horizontal force per vertical velocity.", default=0.0)
 
     def __post_init__(self) -> None:
         super().__post_init__()

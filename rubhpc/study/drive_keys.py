@@ -47,7 +47,6 @@ class DriveKeys:
     inertia: float | None = quantity(
         "kg*m^2",
         doc="Polar inertia of drive and coupling; by default a thousandth of the rotor's.",
-        example='"0.01 kg m^2"',
         default=None,
         above=0,
     )

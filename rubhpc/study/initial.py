@@ -55,10 +55,7 @@ class Initial:
     )
     impulse: float = quantity("N*s", doc="Impulse of a knock on the rotor.", example='"0.2 N*s"', default=0.0)
     impulse_angle: float = quantity(
-        "rad",
-        doc="Direction of the impulse, from straight up in the sense of positive spin.",
-        example='"90 deg"',
-        default=0.0,
+        "rad", doc="Direction of the impulse, from straight up in the sense of positive spin.", default=0.0
     )
     impulse_node: int | None = count(
         doc="Node of the rotor that the impulse acts on; by default the output node.",

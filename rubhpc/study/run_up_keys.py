@@ -84,7 +84,7 @@ class RunUpKeys:
         above=0,
     )
     law: tuple[tuple[float, float], ...] = pairs(
-        ("s", "rad/s"),
+        units=("s", "rad/s"),
         doc="In place of start, stop and time: speeds at some times, linear between them.",
         example='[["0 s", "300 rpm"], ["10 s", "3000 rpm"]]',
     )

@@ -47,7 +47,6 @@ class Integrator:
         "s",
         doc="Time step (central-difference), or the longest step of the search for events without a bound "
         "(modal).",
-        example='"0.5 us"',
         default=None,
         at_least=1e-9,  # of a thousandth of it no case would see its end
     )
