@@ -1,25 +1,23 @@
-"""The parts of a rotor: shaft sections, sleeves, discs, bearings, the torsional drive, damping.
-
-A part that can give one thing in two ways has a method `displaced`, which returns the changes of other fields
-when some are set.
-"""
+"""The parts of a rotor: shaft sections, sleeves, discs, bearings, the torsional drive, damping."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, ClassVar
 
 from rubhpc.input.fields import FieldError, check_fields, count, flag, pairs, quantity
-from rubhpc.rig.supports import Placed, Springs, Support
+from rubhpc.rig.supports import Part, Placed, Springs, Support
 
 
 @dataclass(frozen=True, kw_only=True)
-class Tube:
+class Tube(Part):
     """A cylinder or a cone with a bore, of Timoshenko elements.
 
     It is tapered where a diameter at its right end is given: diameters change linearly along it.
     """
+
+    EITHER: ClassVar[tuple[tuple[str, str], ...]] = (("shear_modulus", "poissons_ratio"),)
 
     length: float = quantity("m", doc="Length.", example='"0.8 m"', above=0)
     outer_diameter: float = quantity(
@@ -65,7 +63,7 @@ class Tube:
     )
 
     def __post_init__(self) -> None:
-        check_fields(self)
+        super().__post_init__()
         if self.shear_modulus is not None and self.poissons_ratio is not None:
             problem = "conflicts with shear_modulus, which is E / (2 (1 + nu))"
             raise FieldError("poissons_ratio", f"{problem}; give one of the two")
@@ -93,11 +91,6 @@ class Tube:
             return self.shear_modulus
         assert self.poissons_ratio is not None
         return self.youngs_modulus / (2 * (1 + self.poissons_ratio))
-
-    def displaced(self, keys: set[str]) -> dict[str, Any]:
-        """Return the changes of other fields when `keys` are set."""
-        both = ("shear_modulus", "poissons_ratio")
-        return {other: None for key, other in (both, both[::-1]) if key in keys}
 
 
 MOST_ELEMENTS = 200  # of a shaft or a stator: matrices are dense, and time grows with the third power
@@ -154,20 +147,14 @@ class Sleeve(Tube, Placed):
     Its node or position is that of its left end; its right end is at a node too.
     """
 
+    EITHER: ClassVar = (*Tube.EITHER, *Placed.EITHER)
+
     inner_diameter: float = quantity(
         "m",
         doc="Diameter of the bore, at least that of the shaft; of a tapered sleeve at its left end.",
         example='"20 mm"',
         above=0,
     )
-
-    def __post_init__(self) -> None:
-        Placed.__post_init__(self)
-        Tube.__post_init__(self)
-
-    def displaced(self, keys: set[str]) -> dict[str, Any]:
-        """Return the changes of other fields when `keys` are set."""
-        return Placed.displaced(self, keys) | Tube.displaced(self, keys)
 
 
 @dataclass(frozen=True, kw_only=True)

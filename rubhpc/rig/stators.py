@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, TypeAlias
+from typing import ClassVar, TypeAlias
 
 import numpy as np  # noqa: TC002 - annotations are read when a rig is built
 from numpy.typing import NDArray  # noqa: TC002
 
 from rubhpc.input.fields import (
     FieldError,
-    check_fields,
     choice,
     count,
     flag,
@@ -27,6 +26,7 @@ from rubhpc.models import LINEAR, SECOND_ORDER, default_of
 from rubhpc.rig.matrix_body import check_body, checked_matrices
 from rubhpc.rig.normal_law import NormalLaw
 from rubhpc.rig.parts import MOST_ELEMENTS, UNDAMPED, Damping
+from rubhpc.rig.supports import Part
 from rubhpc.units import typed_quantity
 
 MOST_STATORS = 62  # a contact mode is numbered by the bits of an integer
@@ -34,7 +34,7 @@ KINDS = {"beam": "Stator", "lumped": "LumpedStator", "matrix": "MatrixStator", "
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Seat:
+class Seat(Part):
     """Position of a stator, or of a ring of `count` stators, the first one at `angle`."""
 
     KIND: ClassVar[str] = ""
@@ -90,7 +90,7 @@ class Seat:
     )
 
     def __post_init__(self) -> None:
-        check_fields(self)
+        super().__post_init__()
         law: object = self.law
         if isinstance(law, dict):  # as in a file
             object.__setattr__(self, "law", build(NormalLaw, law, type(self).__name__, "law"))
@@ -310,6 +310,7 @@ class Bore(Seat):
 
     KIND = "bore"
     REFUSED = ("angle", "count")
+    BOTH: ClassVar = {one: ((f"{one}_y", f"{one}_z"), ()) for one in ("stiffness", "damping")}
 
     mass: float | None = quantity(
         "kg", doc="Mass of the hole's body.", example='"2 kg"', default=None, above=0
@@ -350,48 +351,28 @@ class Bore(Seat):
                 raise FieldError(key, "a bore surrounds the rotor and has none; remove it")
         if len(self.centre) != 2:
             raise FieldError("centre", 'not two numbers; write ["20 um", "-35 um"], up and across')
-        both = {one: (f"{one}_y", f"{one}_z") for one in ("stiffness", "damping")}
         if self.rigid:
-            for key in ("mass", *both, *both["stiffness"], *both["damping"]):
+            for key in ("mass", *self.BOTH, *(key for keys, _ in self.BOTH.values() for key in keys)):
                 if getattr(self, key) is not None:
                     raise FieldError(key, "conflicts with rigid = true, which does not move; remove one")
             return
         if self.mass is None:
             raise FieldError("mass", "missing; give mass and stiffness, or rigid = true")
-        for one, single in both.items():
-            given = [key for key in single if getattr(self, key) is not None]
-            if given and getattr(self, one) is not None:
-                problem = f"conflicts with {one}; give either {one} or {' and '.join(single)}"
-                raise FieldError(given[0], problem)
-            if len(given) == 1 or (one == "stiffness" and not given and self.stiffness is None):
-                missing = next(key for key in single if key not in given) if given else one
-                raise FieldError(missing, f"missing; give {one}, or {' and '.join(single)}")
+        for one, (single, _) in self.BOTH.items():
+            missing = [key for key in single if getattr(self, key) is None]
+            if len(missing) == 1 or (one == "stiffness" and missing and self.stiffness is None):
+                key = missing[0] if len(missing) == 1 else one
+                raise FieldError(key, f"missing; give {one}, or {' and '.join(single)}")
 
     @property
     def springs(self) -> tuple[float, float]:
         """Vertical and horizontal stiffness, N/m."""
-        return self._both("stiffness")
+        return self.straight("stiffness")
 
     @property
     def dampers(self) -> tuple[float, float]:
         """Vertical and horizontal damping, N s/m."""
-        return self._both("damping")
-
-    def _both(self, one: str) -> tuple[float, float]:
-        common = getattr(self, one) or 0.0
-        y, z = (getattr(self, f"{one}_{axis}") for axis in "yz")
-        return (common if y is None else y, common if z is None else z)
-
-    def displaced(self, keys: set[str]) -> dict[str, Any]:
-        """Return the changes of other fields when `keys` are set."""
-        changes: dict[str, Any] = {}
-        for one in ("stiffness", "damping"):
-            single = (f"{one}_y", f"{one}_z")
-            if one in keys and not keys & {*single}:
-                changes |= dict.fromkeys(single)
-            elif getattr(self, one) is not None and keys & {*single}:
-                changes |= dict.fromkeys(single, getattr(self, one)) | {one: None}
-        return changes
+        return self.straight("damping")
 
     @property
     def carrier_problem(self) -> str:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from rubhpc.errors import InputError, located
 from rubhpc.input.messages import nearest
-from rubhpc.study.contact_keys import NEEDS_LAW, Contact, ContactKeys
+from rubhpc.study.contact_keys import LAWS_OF, Contact, ContactKeys
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -86,7 +86,7 @@ def contact_at(stated: ContactKeys, values: Mapping[str, float]) -> Contact:
         words = choices_of(name)
         set_here[name.removeprefix(PREFIX)] = words[int(value)] if words else value
     keys = asdict(stated) | set_here
-    for key, (other, laws, _) in NEEDS_LAW.items():  # a key of [contact] holds for the cases of its laws only
+    for key, (other, laws) in LAWS_OF.items():  # a key of [contact] holds for the cases of its laws only
         if key not in set_here and keys[other] not in laws:
             keys[key] = None
     return Contact(**keys)
@@ -111,7 +111,7 @@ def check_contacts(stated: ContactKeys, axes: Sequence[Tried]) -> list[Contact]:
             found.append(contact_at(stated, at))
     for key, value in asdict(stated).items():
         if value is not None and all(getattr(contact, key) is None for contact in found):
-            kind, laws, _ = NEEDS_LAW[key]
+            kind, laws = LAWS_OF[key]
             listed = " or ".join(f'"{law}"' for law in laws)
             raise InputError(f"[contact] {key}: no case has {kind} = {listed}; leave it out")
     return found
