@@ -158,7 +158,7 @@ def search_of(
     InputError
         As there.
     """
-    if starts := [axis.name for axis in study.axes if axis.is_initial_key]:
+    if starts := [axis.name for axis in study.axes if axis.table == "initial"]:
         raise InputError(f"[grid] {starts[0]}: the knock itself is searched for; remove this axis")
     tables = {"branch": study.branch, "run_up": study.run_up, "drive": study.drive}
     for table, found in tables.items():

@@ -16,7 +16,6 @@ from postproc.store.variables import require_variables
 from rubhpc.errors import InputError
 from rubhpc.schema import DONE, INFERRED, REGIME, SECTION_NAMES
 from rubhpc.study.axes import coordinate_of
-from rubhpc.study.initial import PREFIX
 from rubhpc.study.sampling import CASE
 
 if TYPE_CHECKING:
@@ -39,7 +38,7 @@ NO_MOTION = 0  # of a case that is not done, or had not settled
 _SECTIONS = tuple(f"section_{name}" for name in SECTION_NAMES)
 _TORSION = SECTION_NAMES.index("torsion")  # the displacements come before it
 _IF_THERE = ("settled", "largest_multiplier", "multiplier_angle")  # older stores lack some
-_START = coordinate_of(PREFIX)
+_START = coordinate_of("initial.")
 
 
 class _Motions(NamedTuple):
@@ -81,7 +80,7 @@ def start_axes(store: xr.Dataset) -> list[str]:
     if not starts:
         raise InputError(
             f"{source(store)}: basins need starts that differ: an axis of [grid] such as "
-            f'"{PREFIX}vertical" = {{ start = "-1 mm", stop = "1 mm", num = 21 }}'
+            f'"initial.vertical" = {{ start = "-1 mm", stop = "1 mm", num = 21 }}'
         )
     return starts
 

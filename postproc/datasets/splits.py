@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rubhpc.errors import InputError
-from rubhpc.study import contact_axes, initial
 from rubhpc.study.axes import CLEARANCE_AXES, DIRECTION, coordinate_of
 
 if TYPE_CHECKING:
@@ -17,9 +16,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 SPLITS = ("train", "validation", "test")
-_OF_START = coordinate_of(initial.PREFIX)
+_OF_START = coordinate_of("initial.")
 _OF_GAP = ("friction", *CLEARANCE_AXES)
-_OF_CONTACT = (coordinate_of(contact_axes.PREFIX), "stator_", "carrier_")
+_OF_CONTACT = (coordinate_of("contact."), "stator_", "carrier_")
 
 
 def check_shares(shares: Sequence[float]) -> None:

@@ -13,7 +13,7 @@ from rubhpc.models import ABSENT, in_words
 from rubhpc.rig.reading import rig_from_dict, with_keys
 from rubhpc.rig.stators import Stator, geometries
 from rubhpc.schema import BORE_MEASURES
-from rubhpc.study.axes import coordinate_of, is_of_table
+from rubhpc.study.axes import axis_table, coordinate_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -219,5 +219,5 @@ def is_carried(case: xr.Dataset) -> bool:
 
 def rig_axes(case: xr.Dataset) -> dict[str, str]:
     """Return the axes of the study that are keys of the rig: coordinate to dotted key."""
-    keys = (name for name in table_of(case, "study").get("grid", {}) if "." in name and not is_of_table(name))
+    keys = (name for name in table_of(case, "study").get("grid", {}) if "." in name and not axis_table(name))
     return {coordinate_of(key): key for key in keys}

@@ -24,8 +24,7 @@ from rubhpc.integrate.case import run_case
 from rubhpc.recent import recent
 from rubhpc.rig.reading import with_keys
 from rubhpc.schema import DONE, PROBE
-from rubhpc.study import contact_axes, initial
-from rubhpc.study.axes import OWN, SPEED_AXES
+from rubhpc.study.axes import OWN, SPEED_AXES, axis_table
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -93,10 +92,8 @@ def simulated(
     for name, value in settings.items():
         if name in OWN:
             given[name] = value
-        elif name.startswith(contact_axes.PREFIX):
-            given[name.removeprefix(contact_axes.PREFIX)] = value
-        elif name.startswith(initial.PREFIX):
-            start[name.removeprefix(initial.PREFIX)] = value
+        elif table := axis_table(name):
+            (given if table == "contact" else start)[name.removeprefix(f"{table}.")] = value
         else:
             overrides[name] = value
     case = case_of(

@@ -11,7 +11,7 @@ import numpy as np
 from rubhpc.errors import InputError
 from rubhpc.input.messages import place
 from rubhpc.input.quantity import parse_quantity
-from rubhpc.study.axes import meanings_of
+from rubhpc.study.axes import stated
 from rubhpc.study.axis_reading import NORMAL_KEYS, declared_axis, make_axis, make_range
 
 if TYPE_CHECKING:
@@ -76,8 +76,7 @@ class Prior:
 
     def as_given(self, value: float) -> float | str:
         """Return a value as an argument of a case takes it: of a choice its word."""
-        words = meanings_of(self.name)
-        return words[int(value)] if words else value
+        return stated(self.name, value)
 
 
 def at_shares(priors: Sequence[Prior], shares: Floats) -> Floats:

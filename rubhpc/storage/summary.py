@@ -9,7 +9,7 @@ import numpy as np
 
 from rubhpc.schema import DIVERGED, DONE, FAILED, INFERRED, MISSING, REGIME, SETTLED, STATUS
 from rubhpc.storage.duration import duration
-from rubhpc.study.contact_axes import PREFIX, choices_of
+from rubhpc.study.axes import meanings_of
 from rubhpc.validity import MONITORS, STEADY_SLIP, counted
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from rubhpc.storage.manifest import Manifest
 
-_LAW = f"{PREFIX}friction_law"
+_LAW = "contact.friction_law"
 
 
 def verdicts(manifest: Manifest, is_done: NDArray[np.bool_], measures: NDArray[np.void]) -> str:
@@ -62,7 +62,7 @@ def _may_reverse(manifest: Manifest) -> NDArray[np.bool_]:
     """Whether slip may reverse in a case, (n_case,): under Coulomb's law."""
     for axis in manifest.axes:
         if axis.name == _LAW:
-            is_coulomb = np.array(axis.values) == choices_of(_LAW).index("coulomb")
+            is_coulomb = np.array(axis.values) == meanings_of(_LAW).index("coulomb")
             lengths = [
                 n if dim == axis.dimension else 1
                 for dim, n in zip(manifest.dims, manifest.shape, strict=True)

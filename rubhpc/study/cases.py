@@ -23,10 +23,9 @@ from rubhpc.input.messages import place
 from rubhpc.rig.reading import with_keys
 from rubhpc.rig.stators import gap_problem
 from rubhpc.schema import STATE
-from rubhpc.study.axes import FROM_REST, RUN_UP_TIME
+from rubhpc.study.axes import FROM_REST, KNOCKED, RUN_UP_TIME
 from rubhpc.study.continuation import CaseIds, continuation_of
 from rubhpc.study.identity import identity_parts
-from rubhpc.study.initial import KNOCKED
 from rubhpc.study.operating_points import operating_points_of
 from rubhpc.study.points import MOST_CASES, Points, boxed
 from rubhpc.study.warnings import decay_of, warnings_of

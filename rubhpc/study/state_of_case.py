@@ -14,7 +14,7 @@ from rubhpc.input.messages import brief
 from rubhpc.input.quantity import parse_quantity
 from rubhpc.rig.reading import rig_from_dict, with_keys
 from rubhpc.schema import DONE, FINAL_STATE, STATUS
-from rubhpc.study.axes import coordinate_of, is_of_table, place_of, study_unit
+from rubhpc.study.axes import axis_table, coordinate_of, place_of, study_unit
 from rubhpc.study.stored_state import StoredState
 
 if TYPE_CHECKING:
@@ -153,4 +153,4 @@ def _key(dim: str) -> str:
 
 def _rig_keys(study: Mapping[str, Any]) -> list[str]:
     """Axes of a stored study that are keys of its rig."""
-    return [name for name in study.get("grid", {}) if "." in name and not is_of_table(name)]
+    return [name for name in study.get("grid", {}) if "." in name and not axis_table(name)]

@@ -18,7 +18,6 @@ from rubhpc.models import SECOND_ORDER, chosen, in_words
 from rubhpc.rig.reading import read_rig, with_keys
 from rubhpc.rig.stators import gap_problem, geometries
 from rubhpc.schema import VARIABLES
-from rubhpc.study import contact_axes
 from rubhpc.study.axes import (
     BOTH,
     CLEARANCE_AXES,
@@ -31,14 +30,14 @@ from rubhpc.study.axes import (
 )
 from rubhpc.study.axis_reading import flatten, make_axis, make_range, unit_of
 from rubhpc.study.branch_keys import BranchKeys, branch_axis, check_branch
-from rubhpc.study.contact_axes import check_contacts
 from rubhpc.study.contact_keys import Contact, ContactKeys
 from rubhpc.study.drive_keys import DriveKeys, check_drive, first_speed
-from rubhpc.study.initial import CONTACT_FREE, Initial, check_initials
+from rubhpc.study.initial import CONTACT_FREE, Initial
 from rubhpc.study.refine import Refine
 from rubhpc.study.run_up_keys import RunUpKeys, check_forces, check_run_up, refuse_speeds, speed_axis
 from rubhpc.study.sampling import draw
 from rubhpc.study.state_of_case import with_state
+from rubhpc.study.table_axes import check_contacts, check_initials, laws_of
 from rubhpc.study.tables import Integrator, Recording, Run, Sample, check_method
 
 if TYPE_CHECKING:
@@ -293,8 +292,8 @@ class Study:
         check_axes(self.axes)
         if self.refine is not None:
             self.refine.refined(self.axes)
-        contacts = check_contacts(self.contact, [axis for axis in self.axes if axis.is_contact_key])
-        check_initials(self.initial, [axis for axis in self.axes if axis.is_initial_key])
+        contacts = check_contacts(self.contact, [axis for axis in self.axes if axis.table == "contact"])
+        check_initials(self.initial, [axis for axis in self.axes if axis.table == "initial"])
         if self.branch is not None:
             beside = [name for name in ("sample", "refine") if getattr(self, name) is not None]
             check_branch(self.branch, self.axes, self.integrator, self.recording, beside)
@@ -310,7 +309,7 @@ class Study:
     @property
     def model(self) -> str:
         """The normal, friction law and geometry of stators that its cases use, in words."""
-        normals, laws = (contact_axes.laws_of(self.contact, self.axes, k) for k in ("normal", "friction_law"))
+        normals, laws = (laws_of(self.contact, self.axes, k) for k in ("normal", "friction_law"))
         return in_words(normals, laws, geometries(self._freest_stators))
 
     @property
@@ -350,7 +349,7 @@ class Study:
             "contact": {
                 key: value
                 for key, value in asdict(self.contact).items()
-                if value is not None and contact_axes.PREFIX + key not in {axis.name for axis in self.axes}
+                if value is not None and f"contact.{key}" not in {axis.name for axis in self.axes}
             },
             **({"initial": plain(self.initial)} if self.initial != DEFAULT_INITIAL else {}),
             "integrator": asdict(self.integrator),
@@ -424,7 +423,7 @@ def study_of(
         for key in table_of(table, name, file):
             if f"{name}.{key}" in {axis.name for axis in axes}:
                 raise InputError(f"{place(file, name, key)}: is also an axis of the grid; remove one")
-    is_varied = any(axis.is_contact_key for axis in axes)
+    is_varied = any(axis.table == "contact" for axis in axes)
     contact = build(ContactKeys if is_varied else Contact, table.get("contact", {}), file, "contact")
     starts = {"from": CONTACT_FREE} if run_up is not None or drive is not None else {}
     initial = build(Initial, starts | table_of(table, "initial", file), file, "initial")
