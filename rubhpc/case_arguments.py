@@ -115,11 +115,6 @@ def case_of(
     """Check the arguments of `caller` and assemble its case; `drive` turns it where its speed is free.
 
     Calls with the same rig and speed share what they assemble, tables of contact modes included.
-
-    Raises
-    ------
-    InputError
-        If an argument cannot be used; its text says which one and how to fix it.
     """
     known = CaseArguments.__annotations__
     for name in given:

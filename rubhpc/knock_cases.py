@@ -151,13 +151,7 @@ class Progress:
 def search_of(
     study: Study, *, angles: int, nodes: Sequence[int], most: float | None, tolerance: float
 ) -> Search:
-    """Return the search of a study's cases; see `rubhpc.least_knock`.
-
-    Raises
-    ------
-    InputError
-        As there.
-    """
+    """Return the search of a study's cases; see `rubhpc.least_knock`."""
     if starts := [axis.name for axis in study.axes if axis.table == "initial"]:
         raise InputError(f"[grid] {starts[0]}: the knock itself is searched for; remove this axis")
     tables = {"branch": study.branch, "run_up": study.run_up, "drive": study.drive}

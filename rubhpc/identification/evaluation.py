@@ -128,13 +128,7 @@ class Shared:
 
 
 def processes(workers: int) -> AbstractContextManager[Pool]:
-    """Return the processes of this run: the ranks of a launcher, or so many workers.
-
-    Raises
-    ------
-    InputError
-        A launcher has started several, and there are to be workers too.
-    """
+    """Return the processes of this run: the ranks of a launcher, or so many workers."""
     if workers > 1:
         return start_workers(workers, take_part)
     return nullcontext(connect())

@@ -97,11 +97,6 @@ def read_prior(name: str, value: Any, rig: Rig, file: str) -> Prior:
     value : dict or list
         `{start, stop}` is uniform, with `scale = "log"` log-uniform; `{mean, std}` is normal; values of a
         list are equally likely, and so are the whole numbers from `start` to `stop` of a node.
-
-    Raises
-    ------
-    InputError
-        The key is unknown, or the table is no such distribution.
     """
     where = place(file, "grid", name)
     declared = declared_axis(name, rig, where)

@@ -107,13 +107,7 @@ class Known(NamedTuple):
 
 
 def read_known(study: str | PathLike[str], *, trust_rig: bool = False) -> Known:
-    """Return what a study file says of a machine before the measurement.
-
-    Raises
-    ------
-    InputError
-        Nothing is open, or the study cannot be identified.
-    """
+    """Return what a study file says of a machine before the measurement."""
     source = Path(study)
     table, name = read_toml(source), str(study)
     for key, reason in _REFUSED.items():
@@ -152,11 +146,6 @@ def read_problem(
         Whether slack bearings are tried too.
     trust_rig : bool
         Whether a rig that is Python code may be run.
-
-    Raises
-    ------
-    InputError
-        A file cannot be read or used; its text says what to do.
     """
     known = read_known(study, trust_rig=trust_rig)
     data = file if isinstance(file, xr.Dataset) else measured(file)

@@ -400,13 +400,7 @@ def parse_field(declared: dataclasses.Field[Any], value: object, where: str) -> 
 
 
 def check_fields(owner: Any) -> None:
-    """Refuse values that the declarations of a dataclass exclude; call it in `__post_init__`.
-
-    Raises
-    ------
-    FieldError
-        Names the field, what is wrong and how to fix it.
-    """
+    """Refuse values that the declarations of a dataclass exclude; call it in `__post_init__`."""
     for declared in dataclasses.fields(owner):
         value = getattr(owner, declared.name)
         problem = check_value(declared, value)

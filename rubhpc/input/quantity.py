@@ -225,11 +225,6 @@ def read_range(table: Mapping[str, object], unit: str, where: str) -> list[float
         SI unit of plain numbers.
     where : str
         Start of error messages.
-
-    Raises
-    ------
-    InputError
-        When the table is not a range, or has too many values.
     """
     fix = "write { start, stop, step } or { start, stop, num }"
     start, stop = _start_and_stop(table, unit, where, RANGE_KEYS, fix)
@@ -253,13 +248,7 @@ def read_range(table: Mapping[str, object], unit: str, where: str) -> list[float
 
 
 def read_ends(table: Mapping[str, object], unit: str, where: str) -> Range:
-    """Return the range of `{start, stop}` or `{start, stop, scale}` that values are to be drawn from.
-
-    Raises
-    ------
-    InputError
-        When it is not such a range.
-    """
+    """Return the range of `{start, stop}` or `{start, stop, scale}` that values are to be drawn from."""
     for key in ("step", "num"):
         if key in table:
             problem = f"{key}: a sample is drawn from start to stop"

@@ -29,13 +29,7 @@ if TYPE_CHECKING:
 
 
 def check_carriers(carriers: Sequence[AnyCarrier], stators: Sequence[AnyStator]) -> None:
-    """Refuse carriers without stators, stators on carriers that are not there, and those that cannot follow.
-
-    Raises
-    ------
-    FieldError
-        Names the carrier or stator.
-    """
+    """Refuse carriers without stators, and stators on none that is there, or that cannot follow."""
     names = [carrier.name for carrier in carriers]
     for i, name in enumerate(names, 1):
         if names.count(name) > 1:

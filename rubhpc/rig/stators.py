@@ -408,13 +408,7 @@ def gap_problem(stators: tuple[AnyStator, ...], clearance: float, *, is_ratio: b
 
 
 def single_stators(stators: tuple[AnyStator, ...]) -> tuple[AnyStator, ...]:
-    """Return stators with every ring replaced by its single stators.
-
-    Raises
-    ------
-    FieldError
-        When there are more than `MOST_STATORS`, or two stators of a ring coincide with others.
-    """
+    """Return stators with every ring replaced by its single stators."""
     if not any(stator.count for stator in stators):
         n_stator = len(stators)
         single = stators

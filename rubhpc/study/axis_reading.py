@@ -52,11 +52,6 @@ def make_axis(name: str, values: object, rig: Rig, file: str = "") -> Axis:
         Whose keys the axis may name.
     file : str
         What errors name.
-
-    Raises
-    ------
-    InputError
-        When the name is unknown, or a value is invalid or duplicated.
     """
     where = place(file, "grid", name)
     declared = declared_axis(name, rig, where)
@@ -72,13 +67,7 @@ def make_axis(name: str, values: object, rig: Rig, file: str = "") -> Axis:
 
 
 def unit_of(name: str, rig: Rig) -> str:
-    """Return the unit of an axis as quantities are written: "kg/m^3"; "" without dimension.
-
-    Raises
-    ------
-    InputError
-        When the name is unknown, or its values are no quantities.
-    """
+    """Return the unit of an axis as quantities are written: "kg/m^3"; "" without dimension."""
     declared = declared_axis(name, rig, name)
     if declared.metadata["kind"] != "quantity":
         raise InputError(f"{name}: is not a quantity; give one, such as friction")
@@ -89,11 +78,6 @@ def make_range(name: str, table: Mapping[str, object], rig: Rig, file: str = "")
     """Return an axis whose values are yet to be drawn, from `{start, stop}` and the `scale` "lin" or "log".
 
     Until then they are the two ends (`rubhpc.study.sampling.draw`).
-
-    Raises
-    ------
-    InputError
-        When the name is unknown, or nothing can be drawn from such a range.
     """
     where = place(file, "grid", name)
     if "sweep" in table:

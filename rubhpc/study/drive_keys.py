@@ -79,13 +79,7 @@ class DriveKeys:
             self._check_range(self.start)
 
     def law_at(self, given: Mapping[str, float]) -> DriveLaw:
-        """The drive of a case, `given` being its values on the axes drive.torque, drive.start, drive.inertia.
-
-        Raises
-        ------
-        InputError
-            No drive follows from it.
-        """
+        """The drive of a case with these values on the axes drive.torque, drive.start, drive.inertia."""
         torque = (given["torque"],) if "torque" in given else self.torque
         start = given.get("start", self.start)
         for name, value in (("torque", torque), ("start", start)):
@@ -126,13 +120,7 @@ def first_speed(keys: DriveKeys, axes: Sequence[Axis]) -> float:
 def check_drive(
     keys: DriveKeys | None, axes: Sequence[Axis], integrator: Integrator, recording: Recording, others: str
 ) -> None:
-    """Refuse what a drive cannot turn; `others` names a table that leaves no room for it, or is "".
-
-    Raises
-    ------
-    InputError
-        It names the key.
-    """
+    """Refuse what a drive cannot turn; `others` names a table that leaves no room for it, or is ""."""
     varied = {axis.key: axis for axis in axes if axis.table == "drive"}
     if keys is None:
         for key in varied:

@@ -31,13 +31,7 @@ _MOST_WRITTEN = 6  # values of an axis in a message
 
 
 def with_state(initial: Initial) -> Initial:
-    """Return a start from a case of a store with the state that it names, read unless it has been.
-
-    Raises
-    ------
-    InputError
-        It cannot be read.
-    """
+    """Return a start from a case of a store with the state that it names, read unless it has been."""
     if initial.state is not None:
         return initial
     return replace(initial, state=read_state(initial.from_, initial.select))
@@ -52,11 +46,6 @@ def read_state(path: str, select: Selection) -> StoredState:
         A store whose study keeps final states.
     select : sequence of (axis, value)
         Numbers in SI units or text, as of `--select`; axes of one value need none.
-
-    Raises
-    ------
-    InputError
-        There is no such store or case, it keeps no final states, or the case is not done.
     """
     where = f"[initial] from: {path}"
     if not Path(path).exists():

@@ -35,11 +35,6 @@ def contact_at(keys: ContactKeys, values: Mapping[str, float]) -> Contact:
     keys : ContactKeys
         What [contact] gives for all cases; what does not apply to the law of these cases is left out.
     values : mapping of axis name to value
-
-    Raises
-    ------
-    InputError
-        There is no such contact: a penalty without stiffness, a multiplier with one.
     """
     if not values:
         return keys if isinstance(keys, Contact) else Contact(**asdict(keys))

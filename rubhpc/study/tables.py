@@ -73,11 +73,6 @@ def check_method(
     """Refuse what the central difference does not know, such as second-order stators, bores and Hertz's law.
 
     A bore is refused with the fixed normal too.
-
-    Raises
-    ------
-    InputError
-        Says what it needs instead.
     """
     bore = next((i for i, stator in enumerate(stators, 1) if stator.is_bore), None)
     if bore is not None and contact.normal == "fixed":
