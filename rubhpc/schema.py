@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,6 +26,10 @@ class Variable:
     long_name: str
     flags: tuple[str, ...] = field(default=())  # meanings of 0, 1, 2, ...
     worst: Literal["max", "min"] = "max"  # the extreme over stators that is the worst of a case
+
+    def of(self, values: Any) -> tuple[tuple[str, ...], Any, dict[str, str]]:
+        """Return a variable of a dataset with these values, along `dims`."""
+        return self.dims, values, described(self.unit, self.long_name)
 
     @property
     def fill_value(self) -> float | int:
@@ -342,6 +346,11 @@ def role_of(name: str) -> str:
 def described(unit: str, long_name: str = "") -> dict[str, str]:
     """Return what a dataset says of a variable."""
     return {"units": unit} | ({"long_name": long_name} if long_name else {})
+
+
+def columns(dims: str | tuple[str, ...], about: Mapping[str, tuple[Any, ...]]) -> dict[str, Any]:
+    """Return variables of a dataset along the same dimensions, from values, unit and long name of each."""
+    return {name: (dims, values, described(*words)) for name, (values, *words) in about.items()}
 
 
 def is_signal(name: str) -> bool:

@@ -15,7 +15,7 @@ from rubhpc.integrate.setup import prepare
 from rubhpc.knock_cases import impulse_scale
 from rubhpc.knock_search import Direction, find_least
 from rubhpc.rig.normal_law import NormalLaw
-from rubhpc.schema import DONE, RUB_KIND
+from rubhpc.schema import DONE, RUB_KIND, described
 from rubhpc.study.contact_keys import Contact
 from rubhpc.study.initial import CONTACT_FREE, Initial
 from rubhpc.study.tables import Integrator, Recording
@@ -101,18 +101,12 @@ def certify_whirl(
             record = _from_side(setup, whirl, factor)
             kinds[k, j], reached[k, j], is_held[k, j] = _outcome(record, whirl)
         report(n_done := n_done + 1, n_all)
-    found = found.assign(
-        whirl_reached_kind=(("whirl", "side"), kinds),
-        whirl_reached_frequency=(
-            ("whirl", "side"),
-            reached,
-            {"units": "rad s-1", "long_name": "Whirl frequency reached"},
-        ),
-        whirl_is_confirmed=(
-            "whirl",
-            is_held.all(axis=1) == (found["whirl_growth_rate"].values < 0.0),
-        ),
-    ).assign_coords(side=list(SIDES))
+    over, about = ("whirl", "side"), described("rad s-1", "Whirl frequency reached")
+    found = found.assign_coords(side=list(SIDES))
+    found["whirl_reached_kind"] = over, kinds
+    found["whirl_reached_frequency"] = over, reached, about
+    is_stable = found["whirl_growth_rate"].values < 0.0
+    found["whirl_is_confirmed"] = "whirl", is_held.all(axis=1) == is_stable
     knocks = []
     for at, of in groups.items():
         knocks.append(_least_knock(rig, dict(zip(_OF, at, strict=True)), of, contact, angles))
@@ -122,7 +116,7 @@ def certify_whirl(
         found[f"knock_{name}"] = "knock", values.astype(int) if name == "stator" else values, {"units": unit}
     for i, (name, meaning) in enumerate(_IMPULSES.items()):
         values = np.array([knock[i] for knock in knocks])
-        found[f"knock_{name}"] = "knock", values, {"units": "N s", "long_name": meaning}
+        found[f"knock_{name}"] = "knock", values, described("N s", meaning)
     return found
 
 

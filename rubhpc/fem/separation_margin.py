@@ -18,7 +18,7 @@ import numpy as np
 import xarray as xr
 from scipy.optimize import brentq, minimize_scalar
 
-from rubhpc.fem.response import contact_free_amplitude, response_nodes, steady_response
+from rubhpc.fem.response import contact_free_amplitude, lateral_at_nodes, response_nodes, steady_response
 from rubhpc.schema import described
 
 if TYPE_CHECKING:
@@ -64,10 +64,8 @@ def unbalance_response(
     `v + i w = F exp(i spin t) + conj(B) exp(-i spin t)`, a forward and a backward circle; the semi-axes are
     |F| + |B| and |F| - |B|.
     """
-    nodes = response_nodes(model)
-    rows = np.array([[model.rotor.index(node, name) for name in ("v", "w")] for node in nodes])
     response = np.stack([steady_response(model, float(speed)) for speed in speeds])
-    v, w = np.moveaxis(np.where(rows >= 0, response[:, rows], 0.0), -1, 0)
+    v, w = np.moveaxis(lateral_at_nodes(model, response), -2, 0)
     forward, backward = np.abs(v + 1j * w) / 2, np.abs(v - 1j * w) / 2
     seen = np.stack([v * math.cos(angle) + w * math.sin(angle) for angle in probes], axis=-1)
     phase = np.full(seen.shape, np.nan)  # where nothing moves there is none
@@ -83,7 +81,7 @@ def unbalance_response(
         },
         coords={
             "speed": ("speed", np.asarray(speeds, dtype=np.float64), described("rad s-1", "Spin speed")),
-            "node": ("node", nodes, {"long_name": "Node of the rotor"}),
+            "node": ("node", response_nodes(model), {"long_name": "Node of the rotor"}),
             "probe": ("probe", np.asarray(probes, dtype=np.float64), described("rad", "Angle of the probe")),
         },
     )
