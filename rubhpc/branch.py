@@ -25,7 +25,7 @@ from rubhpc.rig.rig import Rig
 from rubhpc.rig.stators import gap_problem
 from rubhpc.study.axis_reading import unit_of
 from rubhpc.study.branch_keys import LONGEST_PERIOD, check_followed
-from rubhpc.study.study import Recording
+from rubhpc.study.tables import Recording
 from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:

@@ -25,11 +25,11 @@ from rubhpc.rig.probes import Probe
 from rubhpc.rig.reading import packaged_name, read_rig, with_keys
 from rubhpc.rig.rig import Rig
 from rubhpc.rig.stators import gap_problem
-from rubhpc.study.contact_keys import ContactArguments
+from rubhpc.study.contact_keys import Contact, ContactArguments
 from rubhpc.study.initial import Initial
 from rubhpc.study.state_of_case import with_state
-from rubhpc.study.study import Contact, Integrator
 from rubhpc.study.table_axes import check_initials
+from rubhpc.study.tables import Integrator
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from rubhpc.case_arguments import CaseArguments, case_of, check_count, read_keep, read_probes
 from rubhpc.integrate.periodic_motion import find_periodic_motion
-from rubhpc.study.study import Recording
+from rubhpc.study.tables import Recording
 from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from rubhpc.case_arguments import FRICTION, case_of, pick, read_keep, read_probes
 from rubhpc.integrate.case import run_case
-from rubhpc.study.study import Recording
+from rubhpc.study.tables import Recording
 from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:

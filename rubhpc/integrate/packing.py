@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
-    from rubhpc.study.study import Contact
+    from rubhpc.study.contact_keys import Contact
 
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]

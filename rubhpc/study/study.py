@@ -189,21 +189,6 @@ def _check_rig(rig: Rig, axes: tuple[Axis, ...]) -> None:
             raise InputError(f"[grid] clearance: {problem}")
 
 
-__all__ = [
-    "Axis",
-    "Contact",
-    "Integrator",
-    "Recording",
-    "Refine",
-    "Run",
-    "Sample",
-    "Study",
-    "draw",
-    "make_axis",
-    "make_range",
-    "read_study",
-]
-
 _TABLES = (
     *("title", "rig", "output", "grid", "sample", "refine", "branch", "run_up", "drive", "override"),
     *("contact", "initial", "integrator", "record", "run"),
