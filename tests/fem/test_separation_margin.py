@@ -57,12 +57,6 @@ def test_jeffcott_rotor_in_closed_form(ratio, probe):
         assert peak.amplification_factor == pytest.approx(peak.speed / (above - below), rel=1e-6)
 
 
-@pytest.mark.parametrize("ratio", [1e-3, 0.01, 0.03])
-def test_amplification_factor_is_half_the_inverse_damping_ratio(ratio):
-    (peak,) = peaks_of(jeffcott(ratio))
-    assert peak.amplification_factor == pytest.approx(1 / (2 * ratio), rel=4 * ratio)
-
-
 def test_phase_lags_a_quarter_at_the_natural_frequency():
     """tan(lag) = 2 z r / (1 - r^2); w follows v by a quarter turn."""
     ratio, r = 0.05, np.array([0.1, 0.5, 1.0, 2.0, 3.9])
@@ -132,8 +126,3 @@ def test_a_peak_at_the_end_of_the_range_has_no_factor_and_asks_for_the_most():
     assert math.isnan(found.amplification_factor)
     assert found.required_margin((150.0, 200.0)) == 0.16
     assert found.required_margin((50.0, 80.0)) == 0.26
-
-
-def test_a_narrow_peak_is_found_between_coarse_speeds():
-    (found,) = peaks_of(jeffcott(1e-5))
-    assert found.amplification_factor == pytest.approx(5e4, rel=1e-4)

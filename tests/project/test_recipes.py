@@ -17,14 +17,8 @@ def test_there_are_recipes() -> None:
 
 
 @pytest.mark.parametrize("name", RECIPES)
-def test_a_recipe_names_what_exists(name: str) -> None:
-    files = FILE.findall(RECIPES[name])
-    assert files
-    assert [file for file in files if not (ROOT / file).exists()] == []
-
-
-@pytest.mark.parametrize("name", RECIPES)
-def test_a_recipe_has_two_or_three_steps(name: str) -> None:
+def test_a_recipe_names_what_exists_in_two_or_three_steps(name: str) -> None:
+    assert [file for file in FILE.findall(RECIPES[name]) if not (ROOT / file).exists()] == []
     steps = re.findall(r"^\d+\. .*(?:\n(?!\d+\. |\n).*)*", RECIPES[name], re.MULTILINE)
     changed = [step for step in steps if not step.split(". ", 1)[1].startswith("A test")]
     assert 2 <= len(changed) <= 3
