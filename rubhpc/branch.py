@@ -217,13 +217,9 @@ def _operation(
         there = {"overrides": {**(given.get("overrides") or {}), along: value}}
     arguments = cast("CaseArguments", given | there)
     one = case_of("branch", rig, arguments, samples_per_revolution=samples_per_revolution, initial=initial)
-    held = {name: given[name] for name in (*SPEEDS, *CLEARANCES) if given.get(name) is not None}
-    numbers = {
-        "speed_ratio": float(held["speed_ratio"]) if "speed_ratio" in held else None,
-        "speed": one.setup.spin if "speed" in held else None,
-        "clearance_ratio": float(held["clearance_ratio"]) if "clearance_ratio" in held else None,
-        "clearance": one.clearance if "clearance" in held else None,
-    }
+    found = {"speed": one.setup.spin, "clearance": one.clearance}
+    held = [name for name in (*SPEEDS, *CLEARANCES) if given.get(name) is not None]
+    numbers = {name: found[name] if name in found else float(given[name]) for name in held}
     operation = Operation(
         rig=one.rig,
         friction=one.friction,

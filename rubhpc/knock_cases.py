@@ -201,7 +201,11 @@ class _Knocks:
     """Knocks on one case; as a function of impulse and direction, whether one leads to rub."""
 
     def __init__(self, study: Study, case: Case, nodes: Sequence[int]) -> None:
-        self._study, self._case = study, case
+        self._case: Any = {
+            "clearance": case.clearance,
+            "friction": case.friction,
+            "recording": replace(study.recording, keep=()),
+        }
         model = assemble(case.rig)
         for node in nodes:
             check_response_node(model, node, "node")
@@ -217,12 +221,7 @@ class _Knocks:
 
     def compile(self) -> None:
         """Compile what a knock calls."""
-        compile_kernels(
-            self._setup,
-            clearance=self._case.clearance,
-            friction=self._case.friction,
-            recording=replace(self._study.recording, keep=()),
-        )
+        compile_kernels(self._setup, **self._case)
 
     def has_contact_free_motion(self) -> bool:
         """Whether the case stays free of contact without a knock."""
@@ -236,11 +235,5 @@ class _Knocks:
             impulse_angle=direction.angle,
             impulse_node=direction.node,
         )
-        record = run_case(
-            self._setup,
-            clearance=self._case.clearance,
-            friction=self._case.friction,
-            recording=replace(self._study.recording, keep=()),
-            initial=initial,
-        )
+        record = run_case(self._setup, **self._case, initial=initial)
         return record.status != DONE or record.measures["regime"] != REGIME.index("no_contact")

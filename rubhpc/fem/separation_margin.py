@@ -152,26 +152,10 @@ class ResponsePeak:
         return self.separation_margin(operating) >= self.required_margin(operating)
 
 
-def amplitude_over_speed(model: Model, node: int, probe: float | None = None) -> Callable[[float], float]:
-    """Return the function that gives the amplitude at a node, m, for a spin (rad/s).
-
-    Parameters
-    ----------
-    model : Model
-    node : int
-    probe : float, optional
-        Angle of a displacement probe, rad; by default the major semi-axis of the orbit.
-    """
-    if probe is None:
-        unbalanced = replace(model, harmonics=())
-        return lambda spin: contact_free_amplitude(unbalanced, spin, node)
-    along, across = math.cos(probe), math.sin(probe)
-
-    def amplitude(spin: float) -> float:
-        v, w = model.rotor.at_node(node, steady_response(model, spin))
-        return float(abs(along * v + across * w))
-
-    return amplitude
+def amplitude_over_speed(model: Model, node: int) -> Callable[[float], float]:
+    """Return the function that gives the major semi-axis of a node's orbit, m, for a spin (rad/s)."""
+    unbalanced = replace(model, harmonics=())
+    return lambda spin: contact_free_amplitude(unbalanced, spin, node)
 
 
 def grid_through(low: float, high: float, critical: Sequence[CriticalSpeed] = ()) -> NDArray[np.float64]:

@@ -163,10 +163,6 @@ def _parse_words(value: object, limits: Limits, where: str) -> tuple[str, ...]:
     return tuple(value)
 
 
-def _parse_matrix(value: object, _: Limits, where: str) -> Any:
-    return parse_matrix(value, where)
-
-
 def _parse_degrees(value: object, _: Limits, where: str) -> tuple[tuple[int, str], ...]:
     fix = 'write a node and a name for each row, [[1, "v"], [1, "w"]]'
     try:
@@ -263,14 +259,6 @@ def _encode_quantity(value: float | str) -> float | str:
     return value if isinstance(value, str) else float(value)
 
 
-def _encode_degrees(value: Any) -> list[list[Any]]:
-    return [list(degree) for degree in value]
-
-
-def _encode_pairs(value: Any) -> dict[str, float]:
-    return {repr(float(key)): float(number) for key, number in value}
-
-
 KINDS = {
     "quantity": Kind(_parse_quantity, _check_quantity, encode=_encode_quantity),
     "series": Kind(_parse_series, _check_series, encode=list),
@@ -280,11 +268,11 @@ KINDS = {
     "choice": Kind(_parse_text, _check_choice),
     "choices": Kind(_parse_choices, _check_choices, encode=list),
     "words": Kind(_parse_words, encode=list),
-    "criteria": Kind(_parse_criteria, _check_criteria, encode=_encode_degrees),
+    "criteria": Kind(_parse_criteria, _check_criteria, encode=lambda value: [list(pair) for pair in value]),
     "selection": Kind(_parse_selection, encode=dict),
-    "pairs": Kind(_parse_pairs, encode=_encode_pairs),
-    "matrix": Kind(_parse_matrix, encode=encode_matrix),
-    "degrees": Kind(_parse_degrees, encode=_encode_degrees),
+    "pairs": Kind(_parse_pairs, encode=lambda value: {repr(float(a)): float(b) for a, b in value}),
+    "matrix": Kind(lambda value, _, where: parse_matrix(value, where), encode=encode_matrix),
+    "degrees": Kind(_parse_degrees, encode=lambda value: [list(degree) for degree in value]),
 }
 
 

@@ -67,10 +67,13 @@ def table_of(table: dict[str, Any], key: str, file: str) -> dict[str, Any]:
     return value
 
 
-def overridden(rig: Rig, table: dict[str, Any], file: str) -> Rig:
-    """The rig with the values of [override]."""
+def rig_of(table: dict[str, Any], source: Path, *, trust_rig: bool) -> Rig:
+    """The rig that the tables of a file name, with the values of [override]."""
+    file = str(source)
+    name = line_of_text(table, "rig", "", file)
+    rig = read_rig(name, source.parent, place(file, "", "rig"), trust_rig=trust_rig)
     with located(f"{place(file, 'override')} "):
-        return with_keys(rig, dict(flatten(table)))
+        return with_keys(rig, dict(flatten(table_of(table, "override", file))))
 
 
 def read_branch(table: dict[str, Any], grid: dict[str, Any], rig: Rig, file: str) -> BranchKeys:
@@ -385,10 +388,7 @@ def study_of(
         raise InputError(
             f'{place(file, "", "rig")}: missing; add rig = "mokhtar2017", or the path of a rig file'
         )
-    rig = read_rig(
-        line_of_text(table, "rig", "", file), source.parent, place(file, "", "rig"), trust_rig=trust_rig
-    )
-    rig = overridden(rig, table_of(table, "override", file), file)
+    rig = rig_of(table, source, trust_rig=trust_rig)
     kinds = {"sample": Sample, "refine": Refine, "run_up": RunUpKeys, "drive": DriveKeys}
     given: Any = {name: build(kinds[name], table[name], file, name) for name in kinds if name in table}
     sample, run_up, drive = given.get("sample"), given.get("run_up"), given.get("drive")
