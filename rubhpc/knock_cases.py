@@ -192,9 +192,7 @@ def dataset_of(search: Search, found: Mapping[str, LeastKnock]) -> xr.Dataset:
 
 def impulse_scale(model: Model, reach: float) -> float:
     """Return mass x first lateral frequency x reach (m), N s: a knock that moves the rotor about that far."""
-    is_vertical = np.array([name == "v" for _, name in model.rotor.degrees])
-    mass = float(model.rotor.mass[np.ix_(is_vertical, is_vertical)].sum())
-    return mass * first_lateral_frequency(model) * reach
+    return model.rotor.total_mass * first_lateral_frequency(model) * reach
 
 
 class _Knocks:

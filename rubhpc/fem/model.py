@@ -158,6 +158,12 @@ class Body:
         """Number of free degrees of freedom."""
         return len(self.degrees)
 
+    @property
+    def total_mass(self) -> float:
+        """Of a rotor, kg: what moves with it when it is lifted."""
+        upright = [row for row, (_, name) in enumerate(self.degrees) if name == "v"]
+        return float(self.mass[np.ix_(upright, upright)].sum())
+
     @cached_property
     def part(self) -> NDArray[np.int64]:
         """Number of the part that each row belongs to, (n_dof,); no matrix couples one part to another."""
