@@ -236,24 +236,23 @@ class OperatingPoints:
 
     def named(self, axes: Iterable[int], index: Index) -> str:
         """Values of a case on some axes, for messages."""
-        names = (self.study.axes[i].name for i in axes)
-        pairs = zip(names, self._on(axes, index), strict=True)
-        return ", ".join(f"{name} = {value:g}" for name, value in pairs)
+        values = self._by_name(axes, self._on(axes, index))
+        return ", ".join(f"{name} = {value:g}" for name, value in values.items())
+
+    def _by_name(self, axes: Iterable[int], values: Values) -> dict[str, float]:
+        return dict(zip((self.study.axes[i].name for i in axes), values, strict=True))
 
     def _make_rig(self, values: Values) -> Rig:
         """Rig with these values on the rig axes."""
-        keys = (self.study.axes[i].name for i in self.rig_axes)
-        return with_keys(self.study.rig, dict(zip(keys, values, strict=True)))
+        return with_keys(self.study.rig, self._by_name(self.rig_axes, values))
 
     def _make_contact(self, values: Values) -> Contact:
         """Contact with these values on the contact axes."""
-        names = (self.study.axes[i].name for i in self._contact_axes)
-        return contact_at(self.study.contact, dict(zip(names, values, strict=True)))
+        return contact_at(self.study.contact, self._by_name(self._contact_axes, values))
 
     def _make_initial(self, values: Values) -> Initial:
         """Start with these values on the initial axes."""
-        names = (self.study.axes[i].name for i in self._initial_axes)
-        return initial_at(self.study.initial, dict(zip(names, values, strict=True)))
+        return initial_at(self.study.initial, self._by_name(self._initial_axes, values))
 
     def _make_model(self, values: Values) -> Model:
         """Model with these values on the response axes, and the first ones on the other rig axes."""

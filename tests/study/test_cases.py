@@ -231,17 +231,11 @@ def test_a_step_beyond_stability_is_refused_before_the_run():
     CaseGrid(study(SMALL, integrator=Integrator(method="central-difference", step=1e-6)))
 
 
-def test_an_offset_that_closes_a_gap_is_refused_with_the_settings():
-    rig = with_keys(RIG, {"stator.clearance_offset": "-90 um"})  # 0.7 of 122 um is less
-    with pytest.raises(InputError, match=r"\[grid\] clearance_ratio: .* leave no gap"):
-        CaseGrid(study(rig=rig)).operating_points()
-
-
 def test_a_refusal_of_the_settings_names_the_file(tmp_path):
     file = tmp_path / "study.toml"
     with pytest.raises(InputError, match=r"study\.toml: \[integrator\] step: 0\.001 s is above"):
         CaseGrid(study(integrator=Integrator(method="central-difference", step=1e-3), source=file))
-    rig = with_keys(RIG, {"stator.clearance_offset": "-90 um"})
+    rig = with_keys(RIG, {"stator.clearance_offset": "-90 um"})  # 0.7 of 122 um is less
     with pytest.raises(InputError, match=r"study\.toml: \[grid\] clearance_ratio: .* leave no gap"):
         CaseGrid(study(rig=rig, source=file)).operating_points()
 
