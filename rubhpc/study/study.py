@@ -199,14 +199,6 @@ _TABLES = (
 _MOST_AXES = 32  # arrays have 64 dimensions at most
 
 
-DEFAULT_INITIAL, DEFAULT_INTEGRATOR, DEFAULT_RECORDING, DEFAULT_RUN = (
-    Initial(),
-    Integrator(),
-    Recording(),
-    Run(),
-)
-
-
 @dataclass(frozen=True, kw_only=True)
 class Study:
     """A rig and a grid of cases.
@@ -254,10 +246,10 @@ class Study:
     run_up: RunUpKeys | None = None
     drive: DriveKeys | None = None
     contact: ContactKeys = field(default_factory=Contact)
-    initial: Initial = DEFAULT_INITIAL
-    integrator: Integrator = DEFAULT_INTEGRATOR
-    recording: Recording = DEFAULT_RECORDING
-    run: Run = DEFAULT_RUN
+    initial: Initial = field(default_factory=Initial)
+    integrator: Integrator = field(default_factory=Integrator)
+    recording: Recording = field(default_factory=Recording)
+    run: Run = field(default_factory=Run)
     output: Path
     source: Path | None = None
 
@@ -320,6 +312,7 @@ class Study:
 
         Where and how it is run is left out: two runs of one study give the same.
         """
+        own = {"branch": self.branch, "run_up": self.run_up, "drive": self.drive}
         return {
             "title": self.title,
             "rig": self.rig.name,
@@ -331,15 +324,13 @@ class Study:
                 if axis.name != DIRECTION and not (self.changes_speed and axis.name in SPEED_AXES)
             },
             **({"sample": self.sample.as_dict()} if self.sample else {}),
-            **({"branch": asdict(self.branch)} if self.branch else {}),
-            **({"run_up": asdict(self.run_up)} if self.run_up else {}),
-            **({"drive": asdict(self.drive)} if self.drive else {}),
+            **{name: asdict(keys) for name, keys in own.items() if keys},
             "contact": {
                 key: value
                 for key, value in asdict(self.contact).items()
                 if value is not None and f"contact.{key}" not in {axis.name for axis in self.axes}
             },
-            **({"initial": plain(self.initial)} if self.initial != DEFAULT_INITIAL else {}),
+            **({"initial": plain(self.initial)} if self.initial != Initial() else {}),
             "integrator": asdict(self.integrator),
             "record": self.recording.as_dict() | {"keep": list(self.recording.keep)},
         }
