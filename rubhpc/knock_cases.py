@@ -195,6 +195,12 @@ def impulse_scale(model: Model, reach: float) -> float:
     return model.rotor.total_mass * first_lateral_frequency(model) * reach
 
 
+def knocked(impulse: float, direction: Direction) -> Initial:
+    """Return a start in the contact-free motion with an impulse, N s."""
+    angle, node = direction if impulse else (0.0, None)
+    return Initial(from_=CONTACT_FREE, impulse=impulse, impulse_angle=angle, impulse_node=node)
+
+
 class _Knocks:
     """Knocks on one case; as a function of impulse and direction, whether one leads to rub."""
 
@@ -227,11 +233,5 @@ class _Knocks:
 
     def __call__(self, impulse: float, direction: Direction) -> bool:
         """Whether a knock leads to rub: contact in the recorded revolutions."""
-        initial = Initial(
-            from_=CONTACT_FREE,
-            impulse=impulse,
-            impulse_angle=direction.angle,
-            impulse_node=direction.node,
-        )
-        record = run_case(self._setup, **self._case, initial=initial)
+        record = run_case(self._setup, **self._case, initial=knocked(impulse, direction))
         return record.status != DONE or record.measures["regime"] != REGIME.index("no_contact")

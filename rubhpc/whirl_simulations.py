@@ -12,12 +12,11 @@ from rubhpc.fem.assemble import assemble
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.record import State
 from rubhpc.integrate.setup import prepare
-from rubhpc.knock_cases import impulse_scale
+from rubhpc.knock_cases import impulse_scale, knocked
 from rubhpc.knock_search import Direction, find_least
 from rubhpc.rig.normal_law import NormalLaw
 from rubhpc.schema import DONE, RUB_KIND, described
 from rubhpc.study.contact_keys import Contact
-from rubhpc.study.initial import CONTACT_FREE, Initial
 from rubhpc.study.tables import Integrator, Recording
 from rubhpc.threads import on_one_thread
 
@@ -32,6 +31,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.record import Record
     from rubhpc.integrate.setup import Setup
     from rubhpc.rig.rig import Rig
+    from rubhpc.study.initial import Initial
 
     Floats = NDArray[np.float64]
 
@@ -276,13 +276,7 @@ def _least_knock(
 
     def whirls_after(impulse: float, direction: Direction) -> bool:
         """Whether contact lasts and whirls in a predicted sense after a knock."""
-        initial = Initial(
-            from_=CONTACT_FREE,
-            impulse=impulse,
-            impulse_angle=direction.angle if impulse else 0.0,
-            impulse_node=direction.node if impulse else None,
-        )
-        record = _run(setup, at, initial, transient, max(8.0, _RECORDED * turns))
+        record = _run(setup, at, knocked(impulse, direction), transient, max(8.0, _RECORDED * turns))
         frequency = record.measures["whirl_frequency"][i]
         if record.status != DONE or math.isnan(frequency):
             return False
