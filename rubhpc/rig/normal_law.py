@@ -7,8 +7,8 @@ from typing import Any
 
 from rubhpc.input.fields import FieldError, check_fields, choice, quantity
 from rubhpc.input.quantity import WithUnit
+from rubhpc.models import NORMAL_LAWS
 
-LAWS = ("lagrange", "penalty", "hertz")
 UNITS = {"stiffness": ("N/m", "N/m^1.5"), "damping": ("N*s/m", "s/m")}  # of a penalty, of Hertz's law
 _EXAMPLES = {"penalty": "1e8", "hertz": '"1e10 N/m^1.5"'}
 
@@ -72,7 +72,7 @@ class NormalLaw:
     kind: str = choice(
         doc="Contact law, as `law` of the study: multipliers, a spring and damper, or Hertz's law.",
         example='"penalty"',
-        of=LAWS,
+        of=NORMAL_LAWS,
         default="lagrange",
     )
     stiffness: float | None = stiffness_key()

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypedDict
 
 from rubhpc.input.fields import FieldError, check_fields, choice, quantity, series
-from rubhpc.models import MODELS, chosen, default_of
-from rubhpc.rig.normal_law import LAWS, damping_key, restitution_key, stiffness_key, take_units
+from rubhpc.models import FRICTION_LAWS, MODELS, NORMAL_LAWS, chosen, default_of
+from rubhpc.rig.normal_law import damping_key, restitution_key, stiffness_key, take_units
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-FRICTION_LAWS = "sliding", "coulomb", "stribeck", "table"
-# Keys of [contact] that belong to some laws only, and what their absence means there: None needs them.
+# By key of [contact]: the key that chooses its law, the laws that have it, and why others do not.
 NEEDS_LAW: dict[str, tuple[str, tuple[str, ...], str]] = {
     "stiffness": ("law", ("penalty", "hertz"), "a multiplier has none"),
     "damping": ("law", ("penalty", "hertz"), "a multiplier has none"),
@@ -40,7 +39,7 @@ class ContactKeys:
         doc="Contact law: multipliers that close gaps exactly, a spring and damper (penalty), or Hertz's law "
         "with Hunt and Crossley's damping.",
         example='"penalty"',
-        of=LAWS,
+        of=NORMAL_LAWS,
         default="lagrange",
     )
     stiffness: float | None = stiffness_key()

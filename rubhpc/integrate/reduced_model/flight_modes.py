@@ -27,7 +27,7 @@ from rubhpc.kernels.collocation.structures import (
 )
 from rubhpc.kernels.contact_modes import LATERAL_RATE, LATERAL_ROW, N_ROTOR_ROW
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, TORSION, V, W, rim_sense
-from rubhpc.kernels.laws import LAGRANGE, is_set_valued, is_varied
+from rubhpc.kernels.laws import LAGRANGE, depends_on_slip, may_stick
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -242,8 +242,8 @@ class FlightModes:
             friction=np.zeros(q),
             **normal_laws(setup.model, law),
             law=law,
-            is_sticky=bool(plain(is_set_valued)(law)),
-            is_varied=bool(plain(is_varied)(law)),
+            may_stick=bool(plain(may_stick)(law)),
+            depends_on_slip=bool(plain(depends_on_slip)(law)),
             translations=self.rows(setup.reduced.translations @ self.shape[:n]),
             displacement_limit=setup.displacement_limit,
         )
@@ -396,8 +396,8 @@ def energy_forms(
     is_resting = np.abs(total) <= RESTING * np.abs(exponent).max() * 1e-3
     gained, drift = np.zeros((2, 2, n_x, n_x))
     for kind, these in enumerate([slice(0, n_loss), slice(n_loss, None)]):
-        form = power[left[these]].T @ (sign[these, None] * power[right[these]])
-        form = _in_modes(_in_modes(0.5 * (form + form.T), n_complex).T, n_complex)
+        works = power[left[these]].T @ (sign[these, None] * power[right[these]])
+        form = _in_modes(_in_modes(0.5 * (works + works.T), n_complex).T, n_complex)
         grown = np.where(is_resting, 0.0, form / np.where(is_resting, 1.0, total))
         gained[kind] = _in_parts(_in_parts(grown, n_complex).T, n_complex).real
         drift[kind] = _in_parts(_in_parts(np.where(is_resting, form, 0.0), n_complex).T, n_complex).real
