@@ -61,7 +61,9 @@ SUMMED = (
     *("n_contact", "contact_time", "impulse", "stick_time", "friction_work", "energy", "reversals"),
     "turned",
 )
-EXTREMA: dict[str, np.ufunc] = dict.fromkeys(("highest", "peak_force", "peak_lateral", "pivots", "residual"), np.maximum)
+EXTREMA: dict[str, np.ufunc] = dict.fromkeys(
+    ("highest", "peak_force", "peak_lateral", "pivots", "residual"), np.maximum
+)
 EXTREMA |= dict.fromkeys(("lowest", "least_slip"), np.minimum)
 
 UNBALANCE_WORK, DRIVE_WORK, DAMPING_LOSS, FRICTION_LOSS, IMPACT_LOSS, RUB_WORK = range(6)

@@ -170,9 +170,7 @@ def test_kind_of_a_rub_at_a_changing_speed():
     """The contact point goes around with the unbalance, as at constant speed."""
     law = SpeedLaw(time=(0.0, 1.0), speed=(270.0, 290.0))
     recording = Recording(transient=0, revolutions=law.n_revolution, samples_per_revolution=64)
-    setup = prepare(
-        bored(HOLE), 290.0, contact=Contact(), integrator=Integrator(), samples_per_revolution=64
-    )
+    setup = prepare(bored(HOLE), 290.0, contact=Contact(), integrator=Integrator(), samples_per_revolution=64)
     start = simulate(bored(HOLE), **CASE | {"speed_ratio": None, "speed": 270.0}).final
     case = {"recording": recording, "initial": start, "clearance": 80e-6, "friction": 0.1}
     found = record_run_up(setup, law, **case).measures
