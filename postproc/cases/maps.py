@@ -14,6 +14,7 @@ from postproc.store.select import narrow
 from postproc.store.units import meanings
 from postproc.store.variables import require_variables
 from rubhpc.errors import InputError
+from rubhpc.models import may_reverse
 from rubhpc.schema import HAS_VALUES, REGIME, SETTLED, VARIABLES, role_of
 from rubhpc.study.axes import SPEED_AXES, coordinate_of
 from rubhpc.validity import MONITORS, STEADY_SLIP, counted, words
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 _ROLES = ("measure", "flag", "setting")
 MAPPABLE = tuple(n for n, v in VARIABLES.items() if v.role in _ROLES)
-_FRICTION_LAW = "contact_friction_law"  # where it is an axis: under Coulomb's law slip may reverse
+_FRICTION_LAW = "contact_friction_law"  # where it is an axis: under some laws slip may reverse
 MOST_FACETS, MOST_PANELS = 2, 6
 
 
@@ -134,10 +135,10 @@ def map_data(store: xr.Dataset, value: str, spread: Sequence[str], facets: Seque
 
 
 def monitors(store: xr.Dataset) -> dict[str, Monitor]:
-    """Return the monitors that hold for a store: under Coulomb's law slip may reverse."""
+    """Return the monitors that hold for a store: without steady sliding slip may reverse."""
     contact = table_of(store, "study").get("contact", {})
-    has_stick = contact.get("friction_law") == "coulomb"
-    return {n: monitor for n, monitor in MONITORS.items() if not (has_stick and n == STEADY_SLIP)}
+    is_free = may_reverse(contact.get("friction_law"))
+    return {n: monitor for n, monitor in MONITORS.items() if not (is_free and n == STEADY_SLIP)}
 
 
 def validity(store: xr.Dataset) -> xr.DataArray:
@@ -150,7 +151,8 @@ def validity(store: xr.Dataset) -> xr.DataArray:
             # A case is out of range where one of its stators is, whichever is drawn.
             bad = bad.any([d for d in ("stator",) if d in bad.dims])
             if name == STEADY_SLIP and _FRICTION_LAW in store.coords:
-                bad &= store[_FRICTION_LAW] != meanings(store[_FRICTION_LAW]).index("coulomb")
+                laws = meanings(store[_FRICTION_LAW])
+                bad &= store[_FRICTION_LAW].isin([i for i, law in enumerate(laws) if not may_reverse(law)])
             found = found | np.int16(1 << i) * bad.astype(np.int16)
     legend = ", ".join(
         f"{1 << i} ({monitor.name} out of range)"

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 from rubhpc.input.fields import FieldError, check_fields, choice, quantity
 from rubhpc.input.quantity import WithUnit
+from rubhpc.models import NORMAL_LAWS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-LAWS = ("lagrange", "penalty", "hertz")
 UNITS = {"stiffness": ("N/m", "N/m^1.5"), "damping": ("N*s/m", "s/m")}  # of a penalty, of Hertz's law
-# Keys that belong to some laws only, and what their absence means there: None needs them.
+# By key: the laws that have it, and why others do not.
 NEEDS_LAW = {
     "stiffness": (("penalty", "hertz"), "a multiplier has none"),
     "damping": (("penalty", "hertz"), "a multiplier has none"),
-    "restitution": (("lagrange",), "a penalty's rebound comes from its spring and damper"),
+    "restitution": (("lagrange",), "the rebound of a spring law comes from its spring and damper"),
 }
 NEEDED = {"penalty": {"stiffness": "1e8"}, "hertz": {"stiffness": '"1e10 N/m^1.5"'}}  # with examples
 
@@ -99,7 +99,7 @@ class NormalLaw:
     kind: str = choice(
         doc="Contact law, as `law` of the study: multipliers, a spring and damper, or Hertz's law.",
         example='"penalty"',
-        of=LAWS,
+        of=NORMAL_LAWS,
         default="lagrange",
     )
     stiffness: float | None = stiffness_key()

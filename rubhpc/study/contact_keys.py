@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypedDict
 
 from rubhpc.input.fields import FieldError, check_fields, choice, quantity, series
-from rubhpc.models import MODELS, chosen, default_of
+from rubhpc.models import FRICTION_LAWS, MODELS, NORMAL_LAWS, chosen, default_of
 from rubhpc.rig.normal_law import (
-    LAWS,
     NEEDS_LAW,
     check_keys,
     check_spring,
@@ -21,7 +20,6 @@ from rubhpc.rig.normal_law import (
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-FRICTION_LAWS = "sliding", "coulomb", "stribeck", "table"
 # Keys that belong to some friction laws only, as those of the normal force (`rubhpc.rig.normal_law`).
 _NEEDS_FRICTION_LAW = {
     "static_friction_ratio": (("coulomb", "stribeck"), "this law has no such ratio"),
@@ -49,7 +47,7 @@ class ContactKeys:
         doc="Contact law: multipliers that close gaps exactly, a spring and damper (penalty), or Hertz's law "
         "with Hunt and Crossley's damping.",
         example='"penalty"',
-        of=LAWS,
+        of=NORMAL_LAWS,
         default="lagrange",
     )
     stiffness: float | None = stiffness_key()
