@@ -26,6 +26,13 @@ from rubhpc.threads import VARIABLES
 
 # name -> (module and function in `rubhpc.commands`, what it does).
 # The figure commands come from `postproc.catalogue`.
+# Words of click, and plain ones.
+_PLAIN = {
+    "a valid integer range": "a whole number",
+    "a valid integer": "a whole number",
+    "a valid float range": "a number",
+    "a valid float": "a number",
+}
 COMMANDS = {
     "run": ("run:run", "Run or resume a study; the word run may be omitted."),
     "plan": ("run:plan", "Cases, bytes, files, core-hours; done, failed and missing cases."),
@@ -169,6 +176,8 @@ def _report(text: str, code: int) -> int:
 
 def _one_line(error: click.ClickException) -> str:
     text = error.format_message()
+    for words, plain in _PLAIN.items():
+        text = text.replace(words, plain)
     if isinstance(error, click.UsageError) and error.ctx is not None:
         text = f"{text.rstrip('.')}; see {error.ctx.command_path} --help"
     return text

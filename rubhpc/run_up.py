@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.case_arguments import CaseArguments, case_of, read_probes
+from rubhpc.case_arguments import CaseArguments, case_of, read_probes, recording_of
 from rubhpc.errors import InputError, located
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.free_spin import release
@@ -37,7 +37,6 @@ from rubhpc.study.drive_law import DriveLaw
 from rubhpc.study.initial import CONTACT_FREE
 from rubhpc.study.run_up_keys import check_forces
 from rubhpc.study.speed_law import SpeedLaw
-from rubhpc.study.tables import Recording
 from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
@@ -136,7 +135,7 @@ def run_up(
             fix = "give clearance" if name == "clearance_ratio" else "give start, stop and time"
             raise InputError(f"run_up: {name}: the speed changes; {fix}")
     measured = read_probes("run_up", probes)
-    Recording(samples_per_revolution=samples_per_revolution)  # refused as in a study
+    recording_of("run_up", samples_per_revolution=samples_per_revolution)  # refused as in a study
     case["speed"] = _highest(law, rig, case.get("overrides"))
     one = case_of(
         "run_up",
