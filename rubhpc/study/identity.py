@@ -13,7 +13,7 @@ from rubhpc.study.initial import Initial
 if TYPE_CHECKING:
     from rubhpc.study.study import Study
 
-PHYSICS = 200  # version of the physics: raised whenever a study gives other results than before
+PHYSICS = 201  # version of the physics: raised whenever a study gives other results than before
 WHOLE = "n (this sample is drawn as a whole and cannot grow)"
 # Keys of [contact] that are stated even where they are not given, as older stores do.
 _ALWAYS = ("stiffness", "damping", "restitution", "static_friction_ratio")
