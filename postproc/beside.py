@@ -34,12 +34,7 @@ def figure_beside(
     """Return the drawing of some cases and of what was measured; `has_data`: its data are written too.
 
     One case at a constant speed and a record of that kind, or two run-ups, are drawn over one another where
-    the figure has the option `over`.
-
-    Raises
-    ------
-    InputError
-        The figure cannot be drawn of one of the two.
+    the figure has the option `over`. InputError where the figure cannot be drawn of one of the two.
     """
     signals = [str(name) for name in found.data_vars if is_signal(str(name)) and name in cases]
     if not signals:

@@ -84,10 +84,7 @@ class Figure:
     def of(self, cases: xr.Dataset, *args: Any, **words: Any) -> Drawing:
         """Return the drawing of some cases; `args` and `words` are those of the figure's function.
 
-        Raises
-        ------
-        InputError
-            A value is none of those offered or out of range, or the cases cannot be drawn so.
+        InputError where a value is none of those offered or out of range, or the cases cannot be drawn so.
         """
         from postproc.cases.maps import verdict_of
         from postproc.signals.places import named_places

@@ -43,33 +43,18 @@ _START = coordinate_of(PREFIX)
 
 
 class _Motions(NamedTuple):
-    """The motions of one setting.
+    """The motions of one setting."""
 
-    Attributes
-    ----------
-    label : (n_case,)
-        1, 2, ... in the order of `key`; `NO_MOTION` where there is none.
-    key : list of (is_contact, period)
-        Of each motion; period 0 where there is none up to 16.
-    feature : list of (n_section, n_feature)
-        What distinguishes motions of one key, SI units.
-    size : (n_section,)
-        Largest coordinate of the section in the setting, of both displacements, and of torsion, SI units.
-    """
-
-    label: Ints
-    key: list[tuple[bool, int]]
-    feature: list[Floats]
-    size: Floats
+    label: Ints  # (n_case,): 1, 2, ... in the order of `key`; `NO_MOTION` where there is none
+    key: list[tuple[bool, int]]  # of each motion: whether it touches, and its period, 0 of none up to 16
+    feature: list[Floats]  # (n_section, n_feature) of each: what distinguishes motions of one key, SI units
+    size: Floats  # (n_section,): largest coordinate in the setting, of displacements and of torsion, SI units
 
 
 def start_axes(store: xr.Dataset) -> list[str]:
     """Return the dimensions along which starts differ: axes `initial_*`, or `case` where starts were drawn.
 
-    Raises
-    ------
-    InputError
-        There are none of several values, or what was drawn is not a start alone.
+    InputError where none has several values, or what was drawn is not a start alone.
     """
     starts = [axis for axis in axes_of(store) if axis.startswith(_START) and store.sizes[axis] > 1]
     if drawn := drawn_axes(store):
@@ -191,8 +176,8 @@ def _motions_of(setting: xr.Dataset, tolerance: float = TOLERANCE) -> _Motions:
 def _features(sections: Floats, period: int, tolerance: float) -> tuple[Floats, float]:
     """What distinguishes motions of one period (n_case, n_feature), and how near counts as one.
 
-    The points of a periodic motion are sorted, coordinate by coordinate: a shift by revolutions, which a
-    start may cause, changes nothing.
+    Points are sorted, coordinate by coordinate: a shift by revolutions, which a start may cause, changes
+    nothing.
     """
     if 0 < period <= sections.shape[2]:
         return np.sort(sections[:, :, -period:], axis=2).reshape(len(sections), -1), tolerance
@@ -209,10 +194,7 @@ def _without_tori(
 ) -> Ints:
     """Return the periods, (n_case,), 0 where a motion in contact may be on a torus that passes for a period.
 
-    Parameters
-    ----------
-    sections : (n_case, n_section, n_point)
-        In units of the sizes of the setting.
+    `sections` are (n_case, n_section, n_point), in units of the sizes of the setting.
     """
     found = period.copy()
     is_solved = np.isfinite(multiplier)

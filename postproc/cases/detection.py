@@ -97,10 +97,7 @@ def judge(scores: xr.Dataset, false_alarm: float = 0.05, seed: int = 1) -> xr.Da
 def require_both_kinds(store: xr.Dataset, seed: int = 1) -> None:
     """Check that `judge` can learn from a store, by the regime of its cases alone: no waveform is read.
 
-    Raises
-    ------
-    InputError
-        There are too few cases without contact, or with it.
+    InputError where there are too few cases without contact, or with it.
     """
     regime, done = (store[name].values for name in ("regime", "status"))
     _halves(store, regime != REGIME.index("no_contact"), done == DONE, seed)

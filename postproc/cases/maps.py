@@ -59,10 +59,7 @@ def default_axes(
 def scatter_axes(store: xr.Dataset, x: str | None = None, y: str | None = None) -> tuple[str, str]:
     """Return the drawn quantities across and up: those named, else a speed and then the first others.
 
-    Raises
-    ------
-    InputError
-        One that is named was not drawn, or both are the same.
+    InputError where one that is named was not drawn, or both are the same.
     """
     drawn = drawn_axes(store)
     named = [coordinate_of(name) if name else None for name in (x, y)]
@@ -81,10 +78,7 @@ def scatter_axes(store: xr.Dataset, x: str | None = None, y: str | None = None) 
 def facet_axes(store: xr.Dataset, names: Sequence[str], taken: Sequence[str]) -> list[str]:
     """Return the axes of small multiples, down and across: at most two, of at most six values each.
 
-    Raises
-    ------
-    InputError
-        No such axis, too many of them or of their values, or one that the maps spread over already.
+    InputError where there is no such axis, there are more, or the maps spread over one already.
     """
     facets = [find_axis(store, name) for name in names]
     if len(facets) > MOST_FACETS or len({*facets, *taken}) < len(facets) + len(taken):

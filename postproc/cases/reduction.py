@@ -85,10 +85,8 @@ def reduce_store(
         "mean" or "envelope" of the spectra of a signal, "quantiles" or "histogram" of a measure.
     of : str
         The signal, or the measure.
-    over : iterable of axes
-        Axes to reduce; none: all of them.
-    choice : mapping of axis to value, optional
-        The cases to take, as in `postproc.store.select.select`.
+    over, choice
+        Axes to reduce (none: all), and the cases to take, as in `postproc.store.select.select`.
     levels, bins
         Of `quantiles` and `histogram`.
     """

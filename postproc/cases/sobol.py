@@ -128,10 +128,7 @@ def _level_weights(random: np.random.Generator, n: int) -> Floats:
 def by_point(values: xr.DataArray, store: xr.Dataset) -> Floats:
     """Return a measure over the cases of a sample by base point, (n_point, n_range + 2).
 
-    Raises
-    ------
-    InputError
-        When the sample is not Saltelli's, or some of it has been left out by selection.
+    InputError where the sample is not Saltelli's, or some of it has been left out by selection.
     """
     sample = table_of(store, "study").get("sample", {})
     if (method := sample.get("method", SALTELLI)) != SALTELLI:
@@ -172,10 +169,7 @@ def drawn_ranges(store: xr.Dataset) -> list[str]:
 def estimate(values: Floats, n_draw: int, confidence: float, seed: int) -> tuple[Floats, Floats]:
     """Return first-order and total indices and half the width of their intervals, (2, n_range) each.
 
-    Parameters
-    ----------
-    values : (n_point, n_range + 2)
-        Of whole base points.
+    `values` are (n_point, n_range + 2), of whole base points.
     """
     from SALib.analyze import sobol
 

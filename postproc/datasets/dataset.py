@@ -183,10 +183,7 @@ def _waves_of(store: xr.Dataset, signals: Sequence[str]) -> Waves:
 def _rate(store: xr.Dataset, n_sample: int, rate: float | None) -> float:
     """The sampling rate, Hz: as given, or the lowest of those with which the cases are stored.
 
-    Raises
-    ------
-    InputError
-        The shortest record holds no window.
+    InputError where the shortest record holds no window.
     """
     if is_run_up(store):
         speeds, begins = (store[name].transpose(..., "revolution").values for name in ("speed", "time"))

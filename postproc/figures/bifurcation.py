@@ -139,13 +139,7 @@ def draw_simulated(data: xr.Dataset, signal: str, ax: Axes) -> Axes:
 
 
 def default_axis(store: xr.Dataset, along: str | None = None) -> str:
-    """Return the axis named, or else the longest one.
-
-    Raises
-    ------
-    InputError
-        There is no such axis, or none of several values.
-    """
+    """Return the axis named, or else the longest one; InputError where there is none of several values."""
     if along:
         return find_axis(store, along)
     axes = ordered_axes(store, "a bifurcation diagram")
@@ -155,10 +149,7 @@ def default_axis(store: xr.Dataset, along: str | None = None) -> str:
 def default_coloring(store: xr.Dataset, color: str | None = None) -> str:
     """Return the colouring named, or else the direction of the sweep where there are two, or the regime.
 
-    Raises
-    ------
-    InputError
-        By the direction of the sweep in a store with a single one.
+    InputError of a direction in a store with a single one.
     """
     ways = store.sizes.get(DIRECTION, 1)
     if color == DIRECTION and ways < 2:

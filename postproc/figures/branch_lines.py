@@ -38,8 +38,7 @@ _STYLES: dict[bool, dict[str, Any]] = {
 def draw_branches(data: xr.Dataset, variable: str, along: str, ax: Axes) -> Axes:
     """Draw a variable of the points of branches over the axis that they follow.
 
-    Of several values a point, such as a section, there is a line each, in their order: a motion of two
-    revolutions has two. Points of a branch are in order, so that lines turn at folds.
+    Of several values a point, as of a section, there is a line each: a motion of two revolutions has two.
     """
     scale = scale_of(data[variable])
     x, _ = displayed(data[along])
@@ -103,10 +102,7 @@ def name_branches(axes: Sequence[Axes]) -> None:
 def events_at(points: xr.Dataset, shown: xr.Dataset, x: str, y: str) -> xr.Dataset:
     """Return the events of branches in the plane of two axes of a map, at the values of its other axes.
 
-    Raises
-    ------
-    InputError
-        The store has no branches, or they do not run in this plane.
+    InputError where the store has no branches, or they do not run in this plane.
     """
     if not is_of_points(points):
         raise InputError(

@@ -16,7 +16,7 @@ from postproc.figures.cascade_lines import (
 )
 from postproc.figures.cells import cell_edges, is_geometric, tick_levels
 from postproc.figures.drawing import Drawing
-from postproc.figures.options import end_of_abscissa, hertz
+from postproc.figures.options import above_zero
 from postproc.signals.cascade import below, default_axis, hold_peaks, hold_rows
 from postproc.signals.cascade import cascade as cascade_data
 from postproc.signals.lines import SPIKE, parse_orders, spikes
@@ -90,7 +90,7 @@ def cascade(
     """
     lines = parse_orders(order_lines, "--order-lines")
     along = find_axis(cases, along) if along else default_axis(cases)
-    given = end_of_abscissa(max, orders)
+    given = above_zero(max, "" if orders else "Hz", "--max")
     cases, notes = first_of_rest(cases, [along, "stator"], "status")
     cases, name = signal_or_whirl(cases, signal, "torsion", full, probes, node, stator)
     spectra = cascade_data(cases, name, along)
@@ -98,7 +98,7 @@ def cascade(
     if full:  # lateral motion alone
         frequencies.pop("torsional", None)
     for marked, value in (mark or {}).items():
-        frequencies[marked] = hertz(value, f"--mark {marked}")
+        frequencies[marked] = above_zero(value, "Hz", f"--mark {marked}")
     abscissa = "order" if orders else "frequency"
     limit = given or (_MOST_ORDER if orders else default_limit(spectra, frequencies))
 
@@ -119,15 +119,8 @@ def waterfall(
 ) -> Axes:
     """Draw the spectra of a cascade above one another, each on the value of its axis.
 
-    Parameters
-    ----------
-    spectra : (along, order)
-        From `cascade`; only what is drawn is loaded.
-    limit : float
-        End of the abscissa, Hz or orders.
-    abscissa : {"frequency", "order"}
-    height : float
-        Of the highest line, as a part of the ordinate.
+    `spectra` (along, order) are those of `cascade`, of which only what is drawn is loaded; `limit` is the end
+    of the abscissa, Hz or orders, and `height` that of the highest line, as a part of the ordinate.
     """
     spectra = hold_rows(below(spectra, limit, abscissa), _ROWS).compute()
     require_results(spectra, spectra.to_dataset(name="spectra"))

@@ -65,8 +65,7 @@ def draw_centreline(
 ) -> Axes:
     """Draw the mean position, vertical over horizontal; positive spin turns clockwise.
 
-    A `clearance` is a circle, unless it is far beyond: its radius and the horizontal and vertical position of
-    its middle, m.
+    A `clearance` is a circle, unless it is far beyond: radius, and horizontal and vertical position, m.
     """
     x, y, speed = (data[name].values for name in ("horizontal", "vertical", "speed"))
     scale = scale_for("m", float(np.nanmax(np.hypot(x, y))))

@@ -133,10 +133,7 @@ class Drawing:
     def show(self, ax: Axes | Sequence[Axes] | None = None) -> Axes | list[Axes]:
         """Draw on the axes given, or else on a new figure of pyplot, and return the axes.
 
-        Raises
-        ------
-        InputError
-            `ax` has another number of axes than the figure.
+        InputError where `ax` has another number of axes than the figure.
         """
         n_row, n_column = self.panels or (1, 1)
         if ax is None:

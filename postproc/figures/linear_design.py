@@ -56,8 +56,7 @@ def campbell_diagram(
     Parameters
     ----------
     curves : xarray.Dataset
-        `frequency` (Hz), `damping_ratio` and `whirl` over (mode, speed), with the coordinates `kind` and
-        `speed` (rad/s).
+        From `rubhpc.linear_design`.
     critical : sequence of float
         Critical speeds, rad/s, to be marked on the 1X line.
     limit : float, optional
@@ -167,20 +166,11 @@ def _legend(ax: Axes, words: list[str], has_critical: bool) -> None:
 
 
 def unbalance_response(design: xr.Dataset, node: int) -> Drawing:
-    """Return the Bode diagram of a node: amplitude and phase of its unbalance response over the speed.
+    """Return the Bode diagram of a node from `rubhpc.linear_design`, of two panels.
 
-    Parameters
-    ----------
-    design : xarray.Dataset
-        From `rubhpc.linear_design`.
-    node : int
-
-    Returns
-    -------
-    Drawing
-        Of two panels. Above, the major semi-axis of the orbit and the amplitudes at the probes, peaks with
-        their speed and amplification factor, and the operating range as a band; below, the phase lag, which
-        grows downwards as in `postproc.figures.bode` and as API RP 684 and machinery diagnostics draw it.
+    Above, the major semi-axis of the orbit and the amplitudes at the probes, peaks with their speed and
+    amplification factor, and the operating range as a band; below, the phase lag, which grows downwards as in
+    `postproc.figures.bode` and as API RP 684 and machinery diagnostics draw it.
     """
     if node not in design["node"].values:
         raise InputError(
@@ -221,15 +211,10 @@ def unbalance_response(design: xr.Dataset, node: int) -> Drawing:
 
 
 def mode_shapes(design: xr.Dataset) -> Drawing:
-    """Return the mode shapes at the critical speeds, the lowest six, along the shaft.
+    """Return the mode shapes at the critical speeds of a linear design, the lowest six, along the shaft.
 
     Each is drawn at the instant of its greatest displacement, which is 1, with the size of its orbits around;
     triangles are bearings and seals.
-
-    Parameters
-    ----------
-    design : xarray.Dataset
-        From `rubhpc.linear_design`.
     """
     n_critical = min(design.sizes["critical"], MOST_SHAPES)
     if not n_critical:

@@ -136,21 +136,11 @@ def value_maps(
 ) -> Sequence[Axes]:
     """Draw maps from `map_data`, one for each value of its facets, in one scale of colours.
 
-    Flags and periods have distinct colours, other measures a continuous bar and, where asked for, contours.
-    Cases without a result are grey and hatched by their status; those that had not settled, or are out of the
-    model's range, by lines; where most are out of range, a line around these leaves the colours to be seen.
-
-    Parameters
-    ----------
-    data : Dataset over (row, column, y, x), (column, y, x) or (y, x)
-    axes : sequence of Axes
-        As many as there are facets, row by row.
-    n_contour : int
-        Contour lines at about so many levels.
-    computed : bool
-        Whether dots mark the cases that were computed.
-    marks : callable
-        Draws over the first map, and returns what the legend is to name.
+    Flags and periods have distinct colours, other measures a continuous bar and, where asked for, contours at
+    about `n_contour` levels. Cases without a result are grey and hatched by their status; those that had not
+    settled, or are out of the model's range, by lines; where most are out of range, a line around these
+    leaves the colours to be seen. `computed` marks the computed cases by dots; `marks` draws over the first
+    map, and returns what the legend is to name.
     """
     *facets, y_name, x_name = [str(name) for name in data[value].dims]
     data = data.sortby([*facets, y_name, x_name])

@@ -87,18 +87,8 @@ def draw_plane(data: xr.Dataset, ax: Axes) -> Axes:
 def at_edges(values: NDArray[Any], limit: float) -> tuple[NDArray[Any], dict[str, NDArray[Any]]]:
     """Return the complex values in a square, and those beyond it by the arrow of the edge they are drawn at.
 
-    Parameters
-    ----------
-    values : (n,), complex
-        NaN is passed over.
-    limit : float
-        Half the side of the square around zero.
-
-    Returns
-    -------
-    inside : (m,), complex
-    edges : dict
-        By the marker ">", "^", "<" or "v": the places on that edge, complex, on the ray from zero.
+    `limit` is half the side of the square around zero. The others are on the ray from zero, by their marker
+    ">", "^", "<" or "v". NaN is passed over.
     """
     values = values[np.isfinite(values)]
     reach = np.maximum(abs(values.real), abs(values.imag))

@@ -104,10 +104,7 @@ def coloured(data: xr.Dataset, value: str) -> tuple[xr.DataArray, bool]:
 def paint_of(shown: xr.DataArray, log: bool) -> Paint:
     """Return how values become colours: those of a flag or a period distinct ones, others of a scale.
 
-    Raises
-    ------
-    InputError
-        A logarithmic scale for what has none, or no value to show.
+    InputError of a logarithmic scale for what has none, or where there is no value to show.
     """
     if log and shown.name in CATEGORIES:
         raise InputError(f"map: {shown.name} has no scale; draw it without --log")

@@ -93,10 +93,8 @@ def name_speeds(
 ) -> None:
     """Mark round speeds (of rad/s) along the first curve, with the rpm, where they are far enough apart.
 
-    That is `apart` times the diagonal of the plot.
-
-    Each is written where it covers least of curves and of other labels, those of the grid included, with a
-    leader where that is far.
+    That is `apart` times the diagonal of the plot. Each is written where it covers least, with a leader if
+    far.
     """
     x, y = curves[0]
     size = math.hypot(np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim()))

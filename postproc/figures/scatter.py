@@ -32,14 +32,6 @@ def scatter_maps(
 
     Flags and periods have distinct colours, other measures a continuous bar. A case without a result is a
     grey cross, a square marks what had not settled and a ring what is out of the model's range.
-
-    Parameters
-    ----------
-    data : Dataset over (row, column, case), (column, case) or (case,)
-    x, y : str
-        Coordinates over `case`.
-    axes : sequence of Axes
-        As many as there are facets, row by row.
     """
     *facets, case = map(str, data[value].dims)
     across, x_label = displayed(data[x])

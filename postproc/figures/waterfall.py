@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.figures.cascade_lines import ABSCISSA_LABELS, name_senses
 from postproc.figures.drawing import Drawing
-from postproc.figures.options import end_of_abscissa
+from postproc.figures.options import above_zero
 from postproc.figures.run_up_marks import RPM, falling
 from postproc.signals.places import signal_or_whirl
 from postproc.signals.run_ups import run_up_spectra
@@ -77,7 +77,7 @@ def waterfall(
         Draw over orders instead of Hz.
     """
     is_map = form == "spectrogram"
-    limit = end_of_abscissa(max, orders)
+    limit = above_zero(max, "" if orders else "Hz", "--max")
     cases, name = signal_or_whirl(cases, signal, "vertical", full, probes, node, stator)
     shown = run_up_spectra(cases, name, window, _ROWS if is_map else count)
     draw = draw_spectrogram if is_map else draw_waterfall

@@ -39,11 +39,6 @@ def draw_whirl(found: xr.Dataset) -> Drawing:
     frequency at the end. On the right the frequencies of whirls at the frictions given, full where they are
     stable, or else those at which whirl begins. Of a single speed and clearance, one panel: the friction over
     the frequency.
-
-    Parameters
-    ----------
-    found : xarray.Dataset
-        From `rubhpc.dry_whirl`.
     """
     along = next((dim for dim in ("speed", "clearance") if found.sizes[dim] > 1), None)
     n_bore, n_column = found.sizes["stator"], 1 if along is None else 2

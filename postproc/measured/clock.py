@@ -43,21 +43,11 @@ class Sampled(NamedTuple):
 def sampled(
     columns: Mapping[str, Floats], time: Floats | None, rate: float | None, where: str, name: str = ""
 ) -> Sampled:
-    """Return columns on a uniform grid of times.
+    """Return columns (n_sample,), NaN where a sample is missing, on a uniform grid of times.
 
-    Parameters
-    ----------
-    columns : mapping of name to (n_sample,)
-        NaN where a sample is missing.
-    time : (n_sample,), s, optional
-        Of each sample; without it `rate` (Hz) is needed.
-    where, name : str
-        The file and the column of the time, for messages.
-
-    Raises
-    ------
-    InputError
-        The time does not increase, a column has no numbers, or there are too few samples.
+    `time` (s) is that of each sample; without it the `rate` (Hz) is needed. File and column of the time are
+    named in messages: InputError where the time does not increase, a column has no numbers, or there are too
+    few samples.
     """
     n = min((values.size for values in columns.values()), default=0)
     if n < _FEWEST:
@@ -141,8 +131,7 @@ def _is_rounded(time: Floats, off: float) -> bool:
 def clipped(values: Floats) -> tuple[float, list[float]]:
     """Return the share of samples at which a signal is cut off, and at which of its highest and lowest value.
 
-    There are then far more samples at this value than at the one next to it, in runs: of a sine in steps of a
-    converter at most 2.4 times as many.
+    There are then far more samples at this value than at the one next to it, in runs.
     """
     share, levels = 0.0, []
     for sign in (1.0, -1.0):

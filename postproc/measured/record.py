@@ -52,10 +52,7 @@ class Record(NamedTuple):
 def read_record(keys: MeasuredKeys, path: Path) -> Record:
     """Return the record in a file, less its run-out where that is asked for.
 
-    Raises
-    ------
-    InputError
-        The file cannot be read, or has too few revolutions or pulses.
+    InputError where the file cannot be read, or has too few revolutions or pulses.
     """
     record = _tracked(keys, path)
     if keys.slow_roll is None:

@@ -24,17 +24,8 @@ _ASIDE = 1  # revolutions on either side of a block, which its filter sees
 def by_angle(values: Floats, step: float, turning: Turning, first: int, end: int, n: int) -> Floats:
     """Return a signal at `n` uniform angles of each revolution from `first` up to `end`, whole ones.
 
-    Where the shaft turns so slowly that there are more samples in a revolution than
-    `n`, orders beyond half of `n` are filtered off.
-
-    Parameters
-    ----------
-    values : (n_sample,)
-        `step` seconds apart.
-
-    Returns
-    -------
-    ((end - first) * n,)
+    Where the shaft turns so slowly that there are more samples in a revolution than `n`, orders beyond half
+    of `n` are filtered off. The values (n_sample,) are `step` seconds apart.
     """
     seen = between(values)
     parts = []

@@ -55,12 +55,8 @@ def picture(drawing: Drawing, *, is_shared: bool = False) -> str:
 def branch_facts(store: xr.Dataset) -> dict[str, Any]:
     """Return what the page shows of branches.
 
-    Returns
-    -------
-    dict
-        `text`: how many points and branches there are, "" where the store has none; `cases`: of the first
-        cases `label`, the values of their axes, and `diagram` and `multipliers`, addresses that contain
-        pictures.
+    That is `text`: how many points and branches there are, "" where the store has none; `cases`: of the first
+    `label`, the values of their axes, and `diagram` and `multipliers`, addresses that contain pictures.
     """
     if not is_of_points(store) or not store.sizes["point"]:
         return {"text": "", "cases": []}
@@ -89,12 +85,8 @@ def branch_facts(store: xr.Dataset) -> dict[str, Any]:
 def run_up_facts(store: xr.Dataset) -> dict[str, Any]:
     """Return what the page shows of cases whose speed changes.
 
-    Returns
-    -------
-    dict
-        `text`: how many cases are drawn and of which signal, "" where the store has none; `cases`: of the
-        first that are done `label`, the values of their axes, and `pictures`: names and addresses that
-        contain them.
+    That is `text`: of which signal how many are drawn, "" where the store has none; `cases`: of the first
+    that are done `label`, the values of their axes, and `pictures`: names and addresses that contain them.
     """
     if not is_run_up(store) or "status" not in store:
         return {"text": "", "cases": []}
@@ -136,12 +128,9 @@ def _signal(store: xr.Dataset) -> str:
 def design_facts(store: xr.Dataset) -> dict[str, Any]:
     """Return what the page says of the rotor without contact, of the rig as the study states it.
 
-    Returns
-    -------
-    dict
-        `rows`: one for each critical speed, with `speed` (rpm), `whirl`, `damping` (%) and `excited`, as
-        text; `diagram`: the Campbell diagram as an address that contains its SVG; `text`: on stability, or
-        why there is no linear design.
+    That is `rows`: one for each critical speed, with `speed` (rpm), `whirl`, `damping` (%) and `excited`, as
+    text; `diagram`: the Campbell diagram, an address that contains it; `text`: on stability, or why there is
+    none.
     """
     try:
         return _facts(json.dumps(rig_of(store).as_dict(), sort_keys=True))
@@ -150,12 +139,9 @@ def design_facts(store: xr.Dataset) -> dict[str, Any]:
 
 
 def whirl_facts(store: xr.Dataset) -> dict[str, Any]:
-    """Return what the page says of dry whirl in bores, of the rig as the study states it.
+    """Return what the page says of dry whirl in the bores of the rig as the study states it.
 
-    Returns
-    -------
-    dict
-        `sentences`: one for each bore, none where the rig has no bore; `chart`: an address that contains it.
+    That is `sentences`, one for each bore, and `chart`: an address that contains it.
     """
     try:
         rig = rig_of(store)

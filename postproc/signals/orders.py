@@ -87,19 +87,10 @@ def order_over_speed(
 
 
 def written_lag(lead: Floats, speed: Floats, before: tuple[Floats, Floats] | None = None) -> Floats:
-    """Return the lag of a phase, degrees, less whole turns.
+    """Return the lag, degrees, of a phase that leads (n,), rad, less whole turns.
 
-    From one stretch of known phase to the next these are unknown.
-
-    Parameters
-    ----------
-    lead : (n,)
-        rad; NaN where there is none.
-    speed : (n,)
-        Of the shaft.
-    before : tuple of (m,), optional
-        Speed and lag of the curve drawn before, near which each stretch is drawn. Without it the lag at the
-        lowest speed is from -60 to 300 degrees.
+    From one stretch of known phase to the next these are unknown: each stretch is drawn near the curve drawn
+    `before`, of which speed and lag are given. Without one the lag at the lowest speed is from -60 to 300.
     """
     lag = -np.degrees(lead)
     known = np.flatnonzero(np.isfinite(lag) & np.isfinite(speed))

@@ -109,10 +109,7 @@ def signal_or_whirl(
 ) -> tuple[xr.Dataset, str]:
     """Return what a spectrum is of: the store and a signal, or for a full spectrum the whirl at a place.
 
-    Raises
-    ------
-    InputError
-        A signal and a full spectrum, a place without one, or no motion of the place.
+    InputError of a signal with a full spectrum, a place without one, or a motion that is not recorded.
     """
     if not full:
         given = {"--probes": probes, "--node": node, "--stator": stator}

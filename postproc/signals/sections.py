@@ -26,12 +26,8 @@ _REACH = 4  # samples to either side
 def section_of(store: xr.Dataset, signal: str) -> xr.DataArray:
     """Return the section of a signal: the stored one, or else every sample at a whole revolution; lazy.
 
-    Velocities ("vertical_velocity") are taken from the waveform.
-
-    Raises
-    ------
-    InputError
-        The signal is unknown, or neither its section nor its waveform is stored.
+    Velocities ("vertical_velocity") are taken from the waveform. InputError where the signal is unknown, or
+    neither its section nor its waveform is stored.
     """
     if signal in VELOCITIES:
         require_variables(store, [VELOCITIES[signal], "spin_speed"])
@@ -58,10 +54,7 @@ def section_data(store: xr.Dataset, signals: Sequence[str]) -> xr.Dataset:
 def sections_along(store: xr.Dataset, signal: str, along: str, over: str | None = None) -> xr.Dataset:
     """Return the section of a signal with regime, period and status, over ([over,] along, section); lazy.
 
-    Raises
-    ------
-    InputError
-        Other axes than these have several values, or the store keeps neither section nor waveform.
+    InputError where other axes have several values, or the store keeps neither section nor waveform.
     """
     name = f"section_{signal}"
     store = store.assign({name: section_of(store, signal)})

@@ -74,10 +74,7 @@ def full_spectrum(vertical: xr.DataArray, horizontal: xr.DataArray) -> xr.DataAr
 def spectrum_of(store: xr.Dataset, signal: str) -> xr.DataArray:
     """Return the spectrum of a signal: the stored one, or else the stored waveform's; lazy.
 
-    Raises
-    ------
-    InputError
-        The signal is unknown, or the store keeps neither its spectrum nor its waveform.
+    InputError where the signal is unknown, or the store keeps neither.
     """
     check_signal(signal)
     stored = f"spectrum_{signal}"

@@ -187,14 +187,9 @@ def _speeds(speed: xr.DataArray, until: NDArray[np.int64], revolutions: int) -> 
 def mean_shift(tips: xr.Dataset) -> NDArray[np.float64]:
     """Return how far the carrier of each stator has moved up and to +z on average, (n_stator, 2), m.
 
-    It is read from the tips that touch nothing, which move with it: `v cos a + w sin a` outwards and
-    `w cos a - v sin a + s` along the rim, where s is a turn. Stators on the ground have not moved. Of
-    a bore it is how far the hole has moved.
-
-    Parameters
-    ----------
-    tips : Dataset
-        `stator_axial`, `stator_lateral` (m) and `contact_force` (N) of one case over stator and sample.
+    It is read from the tips (of one case, over stator and sample) that touch nothing, which move with it:
+    `v cos a + w sin a` outwards and `w cos a - v sin a + s` along the rim, where s is a turn. Stators on the
+    ground have not moved. Of a bore it is how far the hole has moved.
     """
     stators = rig_of(tips).stator
     axial, lateral, force = (tips[name].transpose("stator", "sample").values.mean(axis=1) for name in NEEDED)

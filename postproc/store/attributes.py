@@ -55,10 +55,7 @@ def table_of(store: xr.Dataset, name: str) -> dict[str, Any]:
 def with_sound_attributes(store: xr.Dataset, path: Path) -> xr.Dataset:
     """Return a store whose attributes are numbers, lists of them, and printable texts; lazily, as it was.
 
-    Raises
-    ------
-    StoreError
-        Attributes are of other types than a run writes, or values of an axis that has words are none of them.
+    StoreError where they are of other types than a run writes, or values of an axis have no meaning.
     """
     try:
         attributes = {name: _parsed(v) if name in _OF_ROOT else v for name, v in store.attrs.items()}

@@ -27,10 +27,7 @@ def axes_of(store: xr.Dataset) -> tuple[str, ...]:
 def ordered_axes(store: xr.Dataset, figure: str) -> list[str]:
     """Return the axes of several values, along which a figure can run; the cases of a sample are in no order.
 
-    Raises
-    ------
-    InputError
-        There is none; the message names the `figure` that needs one.
+    InputError where there is none; the message names the `figure` that needs one.
     """
     axes = [axis for axis in axes_of(store) if store.sizes[axis] > 1 and axis != CASE]
     if not axes:
@@ -54,10 +51,7 @@ def drawn_axes(store: xr.Dataset) -> list[str]:
 def find_axis(store: xr.Dataset, name: str) -> str:
     """Return the dimension of an axis, given by its name or its dotted rig key; "stator" counts as an axis.
 
-    Raises
-    ------
-    InputError
-        There is no such axis left; the message names the nearest one, or all.
+    InputError where there is no such axis left; the message names the nearest one, or all.
     """
     axis = name.replace(".", "_")
     known = [*axes_of(store), *(d for d in ("stator",) if d in store.dims)]

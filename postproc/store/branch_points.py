@@ -44,12 +44,8 @@ def check_points(store: xr.Dataset) -> None:
 def one_case(points: xr.Dataset) -> tuple[xr.Dataset, str, list[str]]:
     """Return the points at the first value of every axis, the axis followed, and a line on each such axis.
 
-    Axes of one value become coordinates without a dimension, as captions have them.
-
-    Raises
-    ------
-    InputError
-        There is no point.
+    Axes of one value become coordinates without a dimension, as captions have them. InputError where there is
+    no point.
     """
     check_points(points)
     notes = []

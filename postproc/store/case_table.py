@@ -87,12 +87,7 @@ def write_table(table: xr.Dataset, path: Path) -> None:
     """Write a table of `case_table` as CSV, or Parquet; it gets its name once it is complete.
 
     In CSV the unit is in the heading, as in `clearance (m)`; in Parquet it is in the metadata of each column,
-    with its long name, and study and rig are in those of the file.
-
-    Raises
-    ------
-    InputError
-        Parquet needs the extra `parquet`, which is not installed.
+    with its long name, and study and rig are in those of the file. InputError where pyarrow is not installed.
     """
     partial = path.with_name(f".{path.name}.part")
     try:

@@ -37,13 +37,7 @@ def check_data_path(path: str | Path) -> Path:
 
 
 def write_data(data: xr.Dataset, path: str | Path) -> Path:
-    """Write a dataset, in csv one line a point, and return its path.
-
-    Raises
-    ------
-    InputError
-        The extension is unknown, or the file cannot be written.
-    """
+    """Write a dataset, in csv one line a point, and return its path; InputError where it cannot be."""
     path = check_data_path(path)
     kind = path.suffix.lower()
     data = data.copy()

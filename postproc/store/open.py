@@ -143,14 +143,10 @@ def _mapped(function: Any, values: xr.DataArray, status: xr.DataArray) -> xr.Dat
 def open_live(path: Path) -> xr.Dataset:
     """Return the store as `open_store` does, with status and measures of every case in the journals.
 
-    What only the journals contain becomes attributes: `reasons` (flat index of a case to why it failed
-    or diverged), `runs` (machine, ranks and times of each) and `running` (who computes now; "" if nobody).
-    A store without journals, such as a copy made with xarray, is returned unchanged.
-
-    Raises
-    ------
-    StoreError
-        There is no store, or it is damaged.
+    What only the journals contain becomes attributes: `reasons` (flat index of a case to why it failed or
+    diverged), `runs` (machine, ranks and times of each) and `running` (who computes now; "" if nobody). A
+    store without journals, such as a copy made with xarray, is returned unchanged. StoreError where there is
+    no store, or it is damaged.
     """
     dataset = open_store(path)
     if not is_store(path):

@@ -28,15 +28,8 @@ ROTOR_MODES = ("lateral", "torsional")
 def rig_of(case: xr.Dataset, values: Mapping[str, float] | None = None) -> Rig:
     """Return the rig of one case: the store's, with the rig keys among its axes at their selected values.
 
-    Parameters
-    ----------
-    values : mapping of dimension to value, optional
-        Of axes that are not selected.
-
-    Raises
-    ------
-    InputError
-        The store contains no rig, or one that this version cannot read.
+    `values` are those of axes that are not selected. InputError where the store contains no rig, or one that
+    this version cannot read.
     """
     table = table_of(case, "rig")
     if not table:

@@ -50,10 +50,7 @@ def as_run_ups(store: xr.Dataset) -> xr.Dataset:
 def steady_view(store: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
     """Return a store of run-ups for figures of variables `names`: signals have their coordinate `revolution`.
 
-    Raises
-    ------
-    InputError
-        The figure needs one speed.
+    InputError where the figure needs one speed.
     """
     if "spin_speed" in names or any(name.startswith("spectrum_") for name in names):
         fix = "draw it with rubhpc waterfall, bode, or spectrum --at SPEED"
@@ -71,15 +68,8 @@ def steady_view(store: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
 def first_around(store: xr.Dataset, speed: NDArray[np.float64], count: int, at: float) -> int:
     """Return the first of `count` revolutions around the one that first has the speed `at`, rad/s.
 
-    Parameters
-    ----------
-    speed : (n_revolution,), rad/s
-        Of one run-up of the store.
-
-    Raises
-    ------
-    InputError
-        The run-up does not pass the speed.
+    `speed` (n_revolution,), rad/s, is that of one run-up of the store. InputError where it does not pass
+    `at`.
     """
     step, low, high = float(np.abs(np.diff(speed)).max(initial=0.0)), float(speed.min()), float(speed.max())
     if not low - step <= at <= high + step:

@@ -198,12 +198,10 @@ def _nearest(store: xr.Dataset, axis: str, wanted: float) -> int:
 
 
 def worst_of_stators(store: xr.Dataset, names: Iterable[str]) -> xr.Dataset:
-    """Return the store with variables at the worst of its stators; lazy.
+    """Return the store with variables at the worst of its stators, as `rubhpc.schema` declares; lazy.
 
-    The largest value of all stators, or the smallest where `rubhpc.schema` declares that as the worse one. A
-    stator without a value, such as a duration without contact, is left out. The attribute `of_stators` of
-    these variables ("largest of 16 stators") becomes a part of their names on axes. Variables that do not
-    depend on the stator are unchanged, and so is a store of a single one.
+    A stator without a value, such as a duration without contact, is left out. The attribute `of_stators` of
+    these variables ("largest of 16 stators") becomes a part of their names on axes.
     """
     if store.sizes.get("stator", 1) == 1:
         return store

@@ -27,10 +27,8 @@ MEASURES = tuple(n for n, v in VARIABLES.items() if v.role in ("measure", "setti
 def require_variables(store: xr.Dataset, names: Iterable[str]) -> None:
     """Check that the store has the variables.
 
-    Raises
-    ------
-    InputError
-        One is missing; the message names the `[record] keep` that stores it, or the nearest name.
+    InputError where one is missing; the message names the `[record] keep` that stores it, or the nearest
+    name.
     """
     for name in names:
         if name in store:
