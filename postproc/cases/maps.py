@@ -11,7 +11,7 @@ from postproc.store.attributes import table_of
 from postproc.store.axes import axes_of, drawn_axes, find_axis, source
 from postproc.store.run_ups import STEADY, is_run_up
 from postproc.store.select import narrow
-from postproc.store.units import meanings
+from postproc.store.units import in_words, meanings
 from postproc.store.variables import require_variables
 from rubhpc.errors import InputError
 from rubhpc.schema import HAS_VALUES, REGIME, SETTLED, VARIABLES, role_of
@@ -180,8 +180,8 @@ def verdict_of(cases: xr.Dataset) -> tuple[str, ...]:
     found = []
     regime, period = (int(case[n]) if n in case else -1 for n in ("regime", "period"))
     if regime >= 0:
-        word = REGIME[regime].replace("quasi_", "quasi-").replace("_", " ")
-        found.append(f"period {period}" if period > 0 and REGIME[regime] == "periodic" else word)
+        is_periodic = period > 0 and REGIME[regime] == "periodic"
+        found.append(f"period {period}" if is_periodic else in_words(REGIME[regime]))
     if "settled" in case and int(case["settled"]) == SETTLED.index("not_settled"):
         found.append("not settled")
     code = int(validity(case))

@@ -126,6 +126,11 @@ def meanings(axis: xr.DataArray) -> list[str]:
     return str(axis.attrs.get("flag_meanings", "")).split()
 
 
+def in_words(flag: str) -> str:
+    """Return a value of a flag as a text has it: "quasi-periodic", "no contact"."""
+    return flag.replace("quasi_", "quasi-").replace("_", " ")
+
+
 def short_name(data: xr.DataArray) -> str:
     """Return a name of the quantity that fits an axis at column width."""
     name = str(data.name).removeprefix("spectrum_").removeprefix("section_")
