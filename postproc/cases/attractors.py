@@ -98,11 +98,10 @@ def attractors(store: xr.Dataset, tolerance: float = TOLERANCE) -> xr.DataArray:
     to `OF_ONE_SOLUTION` tolerances (mirrored solutions have the same multipliers). A periodic case without a
     solution is of the nearest of these motions whose section is within the tolerance, if any. Motions without
     a period up to 16, on a torus or chaotic, are compared by mean and standard deviation of their section, to
-    `SPREAD_TOLERANCE`, whatever their regime. A torus may pass for a long period, where it repeats to within
-    the tolerance of regimes: cases with a period from `LONG_PERIOD` on, of no solution and with a record that
-    closes no better than `CLOSED`, are compared with those. Two tori of about one place and size count as one
-    motion. Cases are joined by single linkage. The torsion of motions without contact decays and is not
-    compared.
+    `SPREAD_TOLERANCE`: two tori of about one place and size count as one. So are those that may pass for a
+    long period, where a torus repeats to within the tolerance of regimes: from `LONG_PERIOD` on, of no
+    solution and with a record that closes no better than `CLOSED`. Cases are joined by single linkage. The
+    torsion of motions without contact decays and is not compared.
     """
     require_variables(store, ["regime", "period", *_SECTIONS])
     starts = start_axes(store)

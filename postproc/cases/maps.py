@@ -99,8 +99,6 @@ def map_data(store: xr.Dataset, value: str, spread: Sequence[str], facets: Seque
     ----------
     store : Dataset
         All other axes of more than one value must have been selected.
-    value : str
-        A measure, setting or flag of the store.
     spread : sequence of str
         The axes x and y of a map, or the one along which the cases of a sample lie.
 

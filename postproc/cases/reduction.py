@@ -10,27 +10,24 @@ from __future__ import annotations
 import math
 import os
 import warnings
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import dask.array as da
 import numpy as np
 import xarray as xr
-import zarr
 
 from postproc.cases.workers import computed as computed
 from postproc.signals.spectra import spectrum_of, with_frequency
 from postproc.store.axes import axes_of, find_axis, source
-from postproc.store.open import open_store
+from postproc.store.open import open_arrays, open_store
 from postproc.store.select import select, worst_of_stators
 from postproc.store.variables import LONG_ROLES, require_measure
 from rubhpc.errors import InputError
-from rubhpc.input.array_files import CHECKED
 from rubhpc.schema import DONE, HAS_VALUES, role_of
-from rubhpc.storage.regular_files import RegularFiles
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
-    from pathlib import Path
 
 
 _MEMORY = 1e9  # bytes of all pieces together, each counted four times: as stored, as read, in between
@@ -48,15 +45,7 @@ def open_in_pieces(path: str | Path, n_byte: float | None = None) -> xr.Dataset:
     if n_byte is None:
         n_byte = min(max(_MEMORY / (4 * (os.cpu_count() or 1)), _SMALLEST), _LARGEST)
     store = open_store(path)
-    with warnings.catch_warnings(), zarr.config.set(CHECKED):
-        warnings.simplefilter("ignore", RuntimeWarning)  # as in `open_store`
-        bare = xr.open_zarr(
-            RegularFiles(path),
-            chunks=None,
-            zarr_format=3,
-            decode_times=False,
-            decode_timedelta=False,
-        )
+    bare = open_arrays(Path(path), chunks=None)
     pieces: dict[str, xr.DataArray] = {}
     for name in map(str, store.data_vars):
         # Those of branches and run-ups, in another form than stored, are few.

@@ -32,20 +32,10 @@ _LEAST_SHARE = 1e-6  # by which a share of the variance is off through rounding,
 
 
 def grid_indices(values: Floats, weights: list[Floats] | None = None) -> Floats:
-    """Return first-order and total Sobol indices on a full grid, exactly.
+    """Return first-order and total Sobol indices on a full grid (n_1, ..., n_axis), exactly, (2, n_axis).
 
     `S_i = Var(E[f | x_i]) / Var(f)`, `T_i = E[Var(f | x_j, j != i)] / Var(f)`, with independent axes whose
-    levels weigh `weights`, or all the same.
-
-    Parameters
-    ----------
-    values : (n_1, ..., n_axis)
-    weights : list of (n_i,), optional
-        Each sums to 1.
-
-    Returns
-    -------
-    (2, n_axis)
+    levels weigh `weights`, (n_i,) each with the sum 1, or all the same.
     """
     weights = weights or [np.full(n, 1 / n) for n in values.shape]
     values = values - values.mean()  # or squares of a large mean hide a small variance

@@ -27,7 +27,7 @@ from postproc.store.case_table import import_parquet, metadata_of
 from postproc.store.run_ups import is_run_up
 from postproc.store.variables import require_results, require_variables
 from rubhpc.errors import InputError, writing
-from rubhpc.schema import DONE, PROBE, TURNED
+from rubhpc.schema import DONE, PROBE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -185,14 +185,13 @@ def _rate(store: xr.Dataset, n_sample: int, rate: float | None) -> float:
 
     InputError where the shortest record holds no window.
     """
+    per_revolution = samples_per_revolution(store)
     if is_run_up(store):
         speeds, begins = (store[name].transpose(..., "revolution").values for name in ("speed", "time"))
-        per_revolution = round(1.0 / float(store[TURNED][1] - store[TURNED][0]))
         turned = np.isfinite(speeds).any(axis=-1)
         shortest = float((np.nanmax(begins[turned], axis=-1) - np.nanmin(begins[turned], axis=-1)).min())
     else:
         speeds = np.abs(store["spin_speed"].values)
-        per_revolution = samples_per_revolution(store["revolution"])
         shortest = store.sizes["sample"] / per_revolution * 2.0 * math.pi / float(speeds.max())
     if rate is None:
         rate = float(f"{per_revolution * float(np.nanmin(speeds)) / (2.0 * math.pi):.3g}")

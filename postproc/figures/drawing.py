@@ -90,37 +90,17 @@ def save(figure: Figure, path: str | Path) -> Path:
 
 @dataclass(frozen=True, kw_only=True)
 class Drawing:
-    """A figure that is still to be drawn: what a figure function returns.
+    """A figure that is still to be drawn: what a figure function returns."""
 
-    Attributes
-    ----------
-    shown : Dataset
-        The data of the figure, as `--data` writes them; coordinates of one value make the caption.
-    draw : callable
-        Draws on a list of axes, row by row.
-    panels : (n_row, n_column), optional
-        Of a figure of several axes; without, it has one.
-    is_shared : bool
-        Whether its axes have one abscissa, and those of a row one ordinate.
-    height, width : float, optional
-        mm; by default as in `postproc.figures.drawing.new_figure`.
-    lines : tuple of str
-        What the figure command prints before it draws.
-    verdict : tuple of str
-        What the caption says besides: of a single case `postproc.cases.maps.verdict_of`, of a map its model.
-    files : mapping of Path to Dataset
-        Further data that the options ask to write.
-    """
-
-    shown: xr.Dataset
-    draw: Callable[[list[Axes]], Any]
-    panels: tuple[int, int] | None = None
-    is_shared: bool = True
-    height: float | None = None
+    shown: xr.Dataset  # as `--data` writes it; coordinates of one value make the caption
+    draw: Callable[[list[Axes]], Any]  # on a list of axes, row by row
+    panels: tuple[int, int] | None = None  # rows and columns of a figure of several axes
+    is_shared: bool = True  # whether its axes have one abscissa, and those of a row one ordinate
+    height: float | None = None  # mm; by default as in `new_figure`
     width: float | None = None
-    lines: tuple[str, ...] = ()
-    verdict: tuple[str, ...] = ()
-    files: Mapping[Path, xr.Dataset] = field(default_factory=dict)
+    lines: tuple[str, ...] = ()  # what the figure command prints before it draws
+    verdict: tuple[str, ...] = ()  # what the caption says besides
+    files: Mapping[Path, xr.Dataset] = field(default_factory=dict)  # further data that options ask to write
 
     def save(self, path: str | Path) -> Path:
         """Draw the figure, write it as png, pdf or svg, and return its path; needs no display."""

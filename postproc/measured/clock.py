@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from postproc.signals.contacts import runs_of
 from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
@@ -100,7 +101,7 @@ def _on_grid(
     off = float(apart[~in_gap].max(initial=0.0))
     is_even = off <= _UNEVEN * step or _is_rounded(time[known], off)
     if in_gap.any():
-        gaps = runs(in_gap)[0]
+        gaps = runs_of(in_gap)[0]
         notes.append(
             f"time: {int(in_gap.sum())} samples are missing in {gaps.size} gaps, up to "
             f"{step * _longest(in_gap):.3g} s in a row"
@@ -146,13 +147,7 @@ def clipped(values: Floats) -> tuple[float, list[float]]:
     return share, levels
 
 
-def runs(flags: Flags) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return where the runs of true begin and end, half open."""
-    edges = np.flatnonzero(np.diff(np.pad(flags.astype(np.int8), 1)))
-    return edges[::2], edges[1::2]
-
-
 def _longest(flags: Flags) -> int:
     """Return the length of the longest run of true."""
-    first, end = runs(flags)
+    first, end = runs_of(flags)
     return int((end - first).max(initial=0))

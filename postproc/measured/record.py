@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from postproc.measured.clock import Sampled, clipped, runs, sampled
+from postproc.measured.clock import Sampled, clipped, sampled
 from postproc.measured.formats import read_columns
 from postproc.measured.keys import unit_factor
 from postproc.measured.shaft import Turning, at_constant_speed, by_key_phasor, by_speed_column
 from postproc.measured.tracking import by_angle
+from postproc.signals.contacts import runs_of
 from rubhpc.errors import InputError
 from rubhpc.input.messages import place
 
@@ -158,10 +159,10 @@ def _longest_part(keys: MeasuredKeys, record: Sampled, begins: Floats) -> tuple[
     bad = np.zeros(begins.size - 1, dtype=bool)
     lasts = np.diff(begins)
     for column in {signal.column for signal in keys.signals}:
-        first, end = (at * record.step for at in runs(record.absent[column]))
+        first, end = (at * record.step for at in runs_of(record.absent[column]))
         held = [np.clip(np.searchsorted(begins, at) - 1, 0, bad.size - 1) for at in (first, end)]
         for is_long, start, stop in zip(end - first > _GAP * lasts[held[0]], *held, strict=True):
             if is_long:
                 bad[start : stop + 1] = True
-    parts = [(int(first), int(end)) for first, end in zip(*runs(~bad), strict=True)]
+    parts = [(int(first), int(end)) for first, end in zip(*runs_of(~bad), strict=True)]
     return max(parts, key=lambda part: part[1] - part[0], default=(0, 0))

@@ -41,7 +41,6 @@ def order_over_speed(
     store : Dataset
         Of `rubhpc.run_up`, a store of run-ups, or one with an axis of speeds and waveforms, in which axes but
         this and `over` have been selected.
-    signals : sequence of str
     order : float
         Multiple of the spin frequency.
     over : str, optional
@@ -64,14 +63,10 @@ def order_over_speed(
     """
     for signal in signals:
         check_signal(signal, store)
-    found = (
-        _of_run_up(store, signals, order, over)
-        if is_run_up(store)
-        else _of_cases(store, signals, order, over)
-    )
-    along = "revolution" if is_run_up(store) else "speed"
-    if along == "speed":
-        found = found.sortby("speed")
+    if is_run_up(store):
+        along, found = "revolution", _of_run_up(store, signals, order, over)
+    else:
+        along, found = "speed", _of_cases(store, signals, order, over).sortby("speed")
     for signal in signals:
         phase, size = found[f"phase_{signal}"], found[f"amplitude_{signal}"].values
         silent = max(SILENT * float(np.nanmax(size, initial=0.0)), NOTHING)
@@ -79,9 +74,9 @@ def order_over_speed(
         if along == "revolution":
             values = np.apply_along_axis(_without_jumps, phase.get_axis_num(along), values)
         unwrapped = np.apply_along_axis(_unwrap, phase.get_axis_num(along), values)
-        found[f"phase_{signal}"] = phase.copy(
-            data=unwrapped - 2 * np.pi * round(_mean(unwrapped) / (2 * np.pi))
-        )
+        known = unwrapped[np.isfinite(unwrapped)]
+        turns = round(float(known.mean()) / (2 * np.pi)) if known.size else 0
+        found[f"phase_{signal}"] = phase.copy(data=unwrapped - 2 * np.pi * turns)
     found["speed"].attrs |= {"units": "rad s-1", "long_name": "spin speed"}
     return found
 
@@ -124,11 +119,6 @@ def _without_jumps(phase: Floats) -> Floats:
     return np.where(near > 0.5, np.nan, phase)
 
 
-def _mean(values: Floats) -> float:
-    finite = values[np.isfinite(values)]
-    return float(finite.mean()) if finite.size else 0.0
-
-
 def _of_run_up(store: xr.Dataset, signals: Sequence[str], order: float, over: str | None) -> xr.Dataset:
     near = np.flatnonzero(np.abs(store["order"].values - order) < NEAR)
     if not near.size:
@@ -142,10 +132,8 @@ def _of_run_up(store: xr.Dataset, signals: Sequence[str], order: float, over: st
             )
             raise InputError(f"{name.split('_', 1)[1]}: no order of it is followed; choose one of {known}")
     store, others = _with_contact(store, ["revolution_contact_fraction", "contact_fraction"])
-    others = ["speed", *others]
-    if "status" in store:
-        store = narrow(store, [*names, *others], [find_axis(store, over)] if over else [])
-    rows = store[[*names, *others]].isel(order=int(near[0]))
+    store = narrow(store, [*names, "speed", *others], [find_axis(store, over)] if over else [])
+    rows = store.isel(order=int(near[0]))
     rows = rows.drop_vars(["order", "stator"], errors="ignore").load()
     turn, last = np.arange(rows.sizes["revolution"]), rows["speed"].notnull().sum("revolution")
     within = xr.DataArray(turn, dims="revolution")

@@ -64,23 +64,12 @@ def sections_along(store: xr.Dataset, signal: str, along: str, over: str | None 
 
 
 def section_velocity(waveform: xr.DataArray, spin_speed: xr.DataArray) -> xr.DataArray:
-    """Return the time derivative of a signal at every whole revolution, in its unit per second; lazy.
+    """Return the time derivative of a signal (..., sample) at every whole revolution, (..., section); lazy.
 
-    It is that of the polynomial of degree 8 through the sample and four on either side; NaN at the first
-    sample, before which there is none. Unlike the derivative of a Fourier series, it needs no whole periods.
-    The relative error at order `k` is about `(2 pi k / n)^8 / 630` of `n` samples a revolution: 2e-9 at 4X of
-    256.
-
-    Parameters
-    ----------
-    waveform : (..., sample)
-        Whole revolutions, with the coordinate `revolution`.
-    spin_speed : (...)
-        rad/s
-
-    Returns
-    -------
-    (..., section)
+    In the unit of the signal per second, at spin speeds (...), rad/s. It is that of the polynomial of degree
+    8 through the sample and four on either side; NaN at the first sample, before which there is none. Unlike
+    the derivative of a Fourier series, it needs no whole periods. The relative error at order `k` is about
+    `(2 pi k / n)^8 / 630` of `n` samples a revolution: 2e-9 at 4X of 256.
     """
     n = samples_per_revolution(waveform)
     near = np.arange(-_REACH, _REACH + 1)

@@ -51,7 +51,7 @@ def waveform_data(
     revolutions : int, optional
         How many; None for all that were recorded.
     at : float, rad/s, optional
-        Spin speed of a run-up.
+        Spin speed of a run-up; InputError where it is none of its speeds.
 
     Returns
     -------
@@ -59,11 +59,6 @@ def waveform_data(
         The signals over `sample`, with the coordinate `revolution` and, where all cases turn at one speed,
         `time` (s) from the first sample kept. Of run-ups that reach their end or the speed in different
         revolutions, `revolution` counts from that of each.
-
-    Raises
-    ------
-    InputError
-        The speed is none of the run-up's, or of a study at constant speeds.
     """
     for signal in signals:
         check_signal(signal, store)
@@ -85,24 +80,11 @@ def orbit_data(
 ) -> xr.Dataset:
     """Return the last revolutions of vertical and horizontal motion, with the clearance; lazy.
 
-    Of one case whose stators stand on a carrier, `carrier_vertical` and `carrier_horizontal` (m, over the
+    Arguments are those of `waveform_data`, of a store with the motion of a place as `moved_at` returns it. Of
+    one case whose stators stand on a carrier, `carrier_vertical` and `carrier_horizontal` (m, over the
     stators) are where that is on average in these revolutions; of bores, where the hole is. There
     `rim_vertical` and `rim_horizontal` (m, over the bores and samples) are the centre of a rim that touches
     the hole at the contact point.
-
-    Parameters
-    ----------
-    store : Dataset
-        One case, or cases along the axis `over`, with the motion of a place as `moved_at` returns it.
-    revolutions : int, optional
-        How many; all that were recorded by default.
-    at : float, rad/s, optional
-        Spin speed of a run-up, around which revolutions are kept in place of the last ones.
-
-    Raises
-    ------
-    InputError
-        As of `waveform_data`.
     """
     spread = [find_axis(store, over)] if over else []
     names = ["vertical", "horizontal", *([] if MEASURED in store.attrs else ["clearance"])]
@@ -142,7 +124,7 @@ def _kept(
             raise InputError(f"{source(store)}: at: its speeds are constant; select one of them")
         return data if revolutions is None else data.isel(sample=slice(-revolutions * n, None))
     spread = [find_axis(store, over)] if over else []
-    speed = (narrow(store, ["speed"], spread) if "status" in store else store)["speed"]
+    speed = narrow(store, ["speed"], spread)["speed"]
     turned = speed.notnull().sum("revolution").values
     if not turned.any() or (revolutions is None and at is None and np.unique(turned[turned > 0]).size > 1):
         return data
