@@ -104,8 +104,10 @@ def cascade(
 
     def draw(axes: list[Axes]) -> None:
         is_waterfall = form == "waterfall"
-        picture = waterfall if is_waterfall else intensity
-        picture(spectra, axes[0], limit, abscissa)
+        if is_waterfall:
+            waterfall(hold_rows(below(spectra, limit, abscissa), _ROWS), axes[0], limit, abscissa)
+        else:
+            intensity(spectra, axes[0], limit, abscissa)
         colors = ("0.35", "white") if is_waterfall else ("0.8", "0.1")
         draw_orders(axes[0], spectra, lines, abscissa, *colors)
         draw_frequencies(axes[0], spectra, frequencies, abscissa, "C1" if is_waterfall else "#56B4E9")
@@ -115,14 +117,20 @@ def cascade(
 
 
 def waterfall(
-    spectra: xr.DataArray, ax: Axes, limit: float, abscissa: str = "frequency", height: float = 0.22
+    spectra: xr.DataArray,
+    ax: Axes,
+    limit: float,
+    abscissa: str = "frequency",
+    height: float = 0.22,
+    spike: float = SPIKE,
 ) -> Axes:
     """Draw the spectra of a cascade above one another, each on the value of its axis.
 
     `spectra` (along, order) are those of `cascade`, of which only what is drawn is loaded; `limit` is the end
-    of the abscissa, Hz or orders, and `height` that of the highest line, as a part of the ordinate.
+    of the abscissa, Hz or orders, `height` that of the highest line, as a part of the ordinate, and `spike`
+    half the width of each line, as a part of the abscissa.
     """
-    spectra = hold_rows(below(spectra, limit, abscissa), _ROWS).compute()
+    spectra = below(spectra, limit, abscissa).compute()
     require_results(spectra, spectra.to_dataset(name="spectra"))
     rows, label = ordinate(spectra)
     spectra = spectra.where(np.abs(spectra["order"]) > 1e-9)  # the mean is no line
@@ -135,7 +143,7 @@ def waterfall(
         if not has_result[i]:
             ax.axhline(rows[i], color="0.6", linewidth=0.5, linestyle=(0, (1, 2)), zorder=2)
             continue
-        at, line = spikes(x[i], gain * np.nan_to_num(spectra.values[i]), SPIKE * limit)
+        at, line = spikes(x[i], gain * np.nan_to_num(spectra.values[i]), spike * limit)
         order = 3 + (rows.max() - rows[i]) / span
         ax.fill_between(at, rows[i], rows[i] + line, color="white", linewidth=0, zorder=order)
         ax.plot(at, rows[i] + line, color="C0", linewidth=0.5, zorder=order)
