@@ -10,7 +10,7 @@ import numpy as np
 
 from postproc.figures.cells import degree_steps
 from postproc.figures.drawing import Drawing
-from postproc.figures.run_up_marks import Labels
+from postproc.figures.run_up_marks import RPM, Labels
 from postproc.signals.orders import written_lag
 from rubhpc.errors import InputError
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 MOST_SHAPES = 6
 _ROOM = 0.12  # of the abscissa: that the name of a peak takes
 _CIRCLE = 0.1  # of the square of an orbit's size: difference of those of its axes, below which it is a circle
-_RPM = 30 / math.pi
 _BAND: dict[str, Any] = {"color": "0.9", "zorder": 0, "linewidth": 0}
 _MAJOR: dict[str, Any] = {"color": "0.7", "linewidth": 2.0}  # seen below those of a circle
 _BEARING: dict[str, Any] = {"marker": "^", "markersize": 5, "color": "k", "markerfacecolor": "white"}
@@ -62,7 +61,7 @@ def campbell_diagram(
     limit : float, optional
         End of the ordinate, Hz; by default just above the highest curve.
     """
-    rpm = 30 / math.pi * curves["speed"].values
+    rpm = RPM * curves["speed"].values
     # an overdamped mode and a rigid body's do not oscillate: their curves are broken
     oscillates = (abs(curves["damping_ratio"]) < 1.0) & (curves["frequency"] > 0.0)
     frequency = curves["frequency"].where(oscillates).values
@@ -82,7 +81,7 @@ def campbell_diagram(
         _draw_order(ax, order)
     if critical:
         speeds = np.asarray(critical)
-        ax.plot(30 / math.pi * speeds, speeds / (2 * math.pi), **_CRITICAL)
+        ax.plot(RPM * speeds, speeds / (2 * math.pi), **_CRITICAL)
         _number(ax, speeds)
     ax.set(xlabel="Spin speed (rpm)", ylabel="Natural frequency (Hz)")
     ax.ticklabel_format(style="plain")
@@ -115,7 +114,7 @@ def _number(ax: Axes, speeds: NDArray[np.float64]) -> None:
         for size, span in ((box.width, right - left), (box.height, np.ptp(ax.get_ylim())))
     )
     lines: list[list[float]] = []
-    for rpm in sorted(30 / math.pi * speeds):
+    for rpm in sorted(RPM * speeds):
         if not left <= rpm <= right:
             continue
         last = lines[-1] if lines else [-math.inf]
@@ -182,9 +181,9 @@ def unbalance_response(design: xr.Dataset, node: int) -> Drawing:
 
     def draw(axes: list[Axes]) -> list[Axes]:
         amplitude, phase = axes
-        rpm = _RPM * shown["response_speed"].values
+        rpm = RPM * shown["response_speed"].values
         if "operating" in design.attrs:
-            ends = _RPM * np.array(design.attrs["operating"])
+            ends = RPM * np.array(design.attrs["operating"])
             amplitude.axvspan(*ends, **_BAND, label="operating speeds")
             phase.axvspan(*ends, **_BAND)
         amplitude.plot(rpm, 1e6 * shown["major_axis"].values, label="major semi-axis", **_MAJOR)
@@ -218,7 +217,7 @@ def mode_shapes(design: xr.Dataset) -> Drawing:
     """
     n_critical = min(design.sizes["critical"], MOST_SHAPES)
     if not n_critical:
-        low, high = (_RPM * speed for speed in design.attrs["speed_range"])
+        low, high = (RPM * speed for speed in design.attrs["speed_range"])
         raise InputError(f"shapes: no critical speed from {low:.6g} to {high:.6g} rpm; widen the range")
     names = [name for name in design.data_vars if str(name).startswith(("critical_", "shape_"))]
     shown = design[[*names, "is_excited"]].isel(critical=slice(n_critical))
@@ -256,7 +255,7 @@ def _draw_shape(ax: Axes, place: np.ndarray[Any, Any], one: xr.Dataset) -> None:
     ax.axhline(0.0, color="0.6", linewidth=0.4)
     ax.plot(place, v, marker=".", label="vertical", **_PROBES[0])
     ax.plot(place, w, marker=".", label="horizontal", **_PROBES[1])
-    rpm = _RPM * float(one["critical_speed"])
+    rpm = RPM * float(one["critical_speed"])
     excited = "" if bool(one["is_excited"]) else ", not excited"
     ax.set_title(f"{rpm:.0f} rpm, {one['critical_whirl'].item()}{excited}", fontsize=6, pad=2)
 
@@ -266,7 +265,7 @@ def _name_peaks(ax: Axes, peaks: xr.Dataset) -> None:
     taken: list[float] = []
     for i in np.argsort(-peaks["peak_amplitude"].values):
         peak = peaks.isel(peak=i)
-        rpm = _RPM * float(peak["peak_speed"])
+        rpm = RPM * float(peak["peak_speed"])
         if any(abs(rpm - other) < _ROOM * ax.get_xlim()[1] for other in taken):
             continue
         taken.append(rpm)
