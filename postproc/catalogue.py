@@ -91,7 +91,7 @@ def _read(file: Path) -> Figure | None:
         return None
     node = next(n for n in ast.parse(source).body if isinstance(n, ast.FunctionDef) and n.name == file.stem)
     description, _, sections = (ast.get_docstring(node) or "").partition("\n\nParameters\n")
-    described = dict(_entries(sections))
+    described = vocabulary.HELP | dict(_entries(sections))
     stub = _stub(node, file)
     _, *parameters = inspect.signature(stub).parameters.values()
     plain = get_type_hints(stub)

@@ -67,14 +67,6 @@ def cascade(
         Other axes are taken at their first value.
     signal
         Which recorded signal [default: torsion].
-    full
-        Forward and backward whirl of the orbit instead of a signal.
-    probes
-        Names of two probes at one place, whose orbit is taken in place of the disc's.
-    node
-        Node of the rotor whose orbit is taken: the recorded one, or one with two probes.
-    stator
-        Number of a stator, at whose node the orbit is taken.
     along
         The axis of the cascade [default: the speed].
     form

@@ -39,12 +39,6 @@ def centreline(
     ----------
     cases
         One case of a study with [run_up].
-    probes
-        Names of two probes at one place, whose position is drawn in place of the disc's.
-    node
-        Node of the rotor whose position is drawn: the recorded one, or one with two probes.
-    stator
-        Number of a stator, at whose node the position is drawn.
     """
     cases = moved_at(cases, probes, node, stator)
     shown = mean_positions(cases, ["vertical", "horizontal"])

@@ -51,6 +51,13 @@ Count = Annotated[int, Bounds(least=1)]
 Seed = Annotated[int, Bounds(least=0)]
 Positive = Annotated[float, Bounds(least=0.0, is_open=True)]
 Share = Annotated[float, Bounds(least=0.0, most=1.0, is_open=True)]
+HELP = {  # of options that several figures have, unless the figure's own docstring has it
+    "full": "Forward and backward whirl of the orbit instead of a signal.",
+    "probes": "Names of two probes at one place, whose motion is taken in place of the disc's.",
+    "node": "Node of the rotor whose motion is taken: the recorded one, or one with two probes.",
+    "stator": "Number of a stator, at whose node the motion is taken.",
+    "over": "Draw the cases along AXIS over one another.",
+}
 
 
 def above_zero(value: float | str | None, unit: str, option: str) -> float | None:

@@ -57,14 +57,6 @@ def orbit(
         Only the last ones [default: all], or how many around the speed `at` [default: 4].
     at
         Spin speed of a run-up, such as "2000 rpm", around which its orbit is drawn.
-    over
-        Draw the cases along AXIS over one another.
-    probes
-        Names of two probes at one place, whose motion is drawn in place of the disc's.
-    node
-        Node of the rotor whose motion is drawn: the recorded one, or one with two probes.
-    stator
-        Number of a stator, at whose node the motion is drawn.
     frame
         Follow the orbit, with the clearance and the centre without loads where they are near; show all of the
         clearance; or take the mean position off.

@@ -60,14 +60,6 @@ def spectrum(
         One case, or cases along the axis `over`.
     signal
         Which recorded signal [default: torsion].
-    full
-        Forward and backward whirl of the orbit instead of a signal.
-    probes
-        Names of two probes at one place, whose orbit is taken in place of the disc's.
-    node
-        Node of the rotor whose orbit is taken: the recorded one, or one with two probes.
-    stator
-        Number of a stator, at whose node the orbit is taken.
     at
         Spin speed of a run-up, such as "2000 rpm", around which a spectrum is taken over 32 revolutions,
         through Hann's window.
@@ -79,8 +71,6 @@ def spectrum(
         How many lines are named.
     log
         Amplitudes on a logarithmic scale.
-    over
-        Draw the cases along AXIS over one another.
     """
     limit = above_zero(max, "" if orders else "Hz", "--max")
     cases, name = signal_or_whirl(cases, signal, "torsion", full, probes, node, stator)

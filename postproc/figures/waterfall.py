@@ -54,14 +54,6 @@ def waterfall(
         One case of a study with [run_up].
     signal
         Which recorded signal [default: vertical].
-    full
-        Forward and backward whirl of the orbit instead of a signal.
-    probes
-        Names of two probes at one place, whose orbit is taken in place of the disc's.
-    node
-        Node of the rotor whose orbit is taken: the recorded one, or one with two probes.
-    stator
-        Number of a stator, at whose node the orbit is taken.
     form
         Spectra above one another, or colours.
     window

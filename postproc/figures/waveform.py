@@ -49,8 +49,6 @@ def waveform(
         The last ones, or those around the speed `at`.
     at
         Spin speed of a run-up, such as "2000 rpm".
-    over
-        Draw the cases along AXIS over one another.
     """
     named = (signal,) if isinstance(signal, str) else signal
     signals = tuple(dict.fromkeys(named)) or default_signals(cases)
