@@ -21,6 +21,7 @@ from postproc.figures.basin_motions import (
 from postproc.figures.cells import cell_edges, hatch_cells, is_geometric, tick_levels
 from postproc.figures.drawing import Drawing
 from postproc.figures.palette import NOT_DONE, NOT_SETTLED
+from postproc.figures.scatter import mark_size
 from postproc.figures.small_multiples import legend_below
 from postproc.store.axes import axes_of, drawn_axes, find_axis, source
 from postproc.store.select import first_of_rest, worst_of_stators
@@ -268,7 +269,7 @@ def _cells(
 def _scatter(data: xr.Dataset, x: Floats, y: Floats, colors: dict[int, str], ax: Axes) -> list[Artist]:
     """Draw a point a start, and return a handle for each motion."""
     found = data["attractor_reached"].values
-    size = float(np.clip(5000.0 / found.size, 3.0, 24.0))
+    size = mark_size(found.size)
     handles: list[Artist] = [
         ax.scatter(x[found == n], y[found == n], size, color=color, linewidths=0, label=motion_label(data, n))
         for n, color in colors.items()
