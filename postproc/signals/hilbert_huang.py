@@ -243,9 +243,7 @@ def _quantiles(one: xr.Dataset, inside: NDArray[np.bool_], shares: tuple[float, 
     """Return amplitude-weighted quantiles of the frequency over some samples, Hz."""
     frequency, amplitude = one["frequency"].values, one["amplitude"].values
     inside = inside & np.isfinite(frequency) & (amplitude > 0)
-    order = np.argsort(frequency[inside], kind="stable")
-    if order.size == 0:
+    if not inside.any():
         return [math.nan] * len(shares)
-    total = np.cumsum(amplitude[inside][order])
-    places = np.searchsorted(total, np.asarray(shares) * total[-1])
-    return [float(f) for f in frequency[inside][order][places]]
+    weights = amplitude[inside]
+    return np.quantile(frequency[inside], shares, weights=weights, method="inverted_cdf").tolist()
