@@ -169,11 +169,6 @@ def test_bad_input_is_one_line(path: Path, call: Any, said: str) -> None:
     assert "\n" not in str(refusal.value)
 
 
-def test_no_store_is_reported(tmp_path: Path) -> None:
-    with pytest.raises(StoreError, match="no such store"):
-        open_in_pieces(tmp_path / "none.zarr")
-
-
 def environment(**more: str) -> dict[str, str]:
     return {**os.environ, "PYTHONPATH": str(ROOT), **more}
 

@@ -209,17 +209,9 @@ def test_what_has_no_indices_is_refused(spoil: Callable[[xr.Dataset], xr.Dataset
     assert "\n" not in str(refusal.value)
 
 
-@pytest.mark.parametrize(
-    ("measure", "said"),
-    [
-        ("status", "status: is not a measure; choose"),
-        ("peak_torson", "did you mean peak_torsion?"),
-    ],
-)
-def test_measure_has_to_be_one(measure: str, said: str) -> None:
-    with pytest.raises(InputError) as refusal:
-        sensitivity(sines(6), measure)
-    assert said in str(refusal.value)
+def test_measure_has_to_be_one() -> None:
+    with pytest.raises(InputError, match="status: is not a measure; choose"):
+        sensitivity(sines(6), "status")
 
 
 def test_bars_are_as_long_as_the_shares() -> None:

@@ -43,12 +43,6 @@ def case(store):
 
 
 @pytest.fixture
-def ax():
-    with house_style():
-        yield new_figure()[1][0]
-
-
-@pytest.fixture
 def plain_map(store):
     chosen = select(store, {"friction": 0.1, "stator_youngs_modulus": 3e9})
     return lambda value: map_data(chosen, value, ["speed_ratio", "clearance"])

@@ -113,10 +113,7 @@ def test_flags_have_no_logarithmic_scale(synthetic_path, value):
 
 def test_maps_spread_over_what_the_facets_leave(synthetic_path):
     store = open_store(synthetic_path).isel(clearance=[0, 1], speed_ratio=[1, 2, 3])
-    assert default_axes(store) == ("speed_ratio", "clearance")
     assert default_axes(store, facets=["speed_ratio"]) == ("clearance", "friction")
-    with pytest.raises(InputError, match="--x and --y are both friction"):
-        default_axes(store, "friction", "friction")
     with pytest.raises(InputError, match="over one axis, draw rubhpc bifurcation"):
         default_axes(store.isel(clearance=0, friction=0, stator_youngs_modulus=0))
 

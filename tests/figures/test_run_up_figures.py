@@ -280,8 +280,8 @@ def test_what_has_no_run_up_is_refused():
         InputError, match=r"its speed is constant; give a run-up, as of a study with \[run_up\]"
     ):
         waterfall(steady)
-    with pytest.raises(InputError, match="no such signal"):
-        waterfall(run_up(), "vertcal")
+    with pytest.raises(InputError, match=r"its speeds are constant; give a store with \[run_up\]"):
+        speed(steady)
     with pytest.raises(InputError, match=r"left: no such signal; did you mean probe_left\?"):
         waterfall(run_up(), "left")
 
@@ -299,8 +299,3 @@ def test_the_speed_is_drawn_over_the_time_with_the_torques_of_a_drive():
     brake, drive = torques.lines[:2]
     assert brake.get_ydata()[-1] == pytest.approx(1.5)
     assert drive.get_ydata() == pytest.approx(np.full(TURNS, 2.0))
-
-
-def test_a_steady_speed_is_not_drawn_over_the_time():
-    with pytest.raises(InputError, match=r"its speeds are constant; give a store with \[run_up\]"):
-        speed(xr.Dataset({"vertical": ("sample", np.zeros(8))}))
