@@ -71,7 +71,7 @@ def toy(
 
 
 @pytest.fixture
-def toy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def toy(tmp_path, monkeypatch):
     """A folder with one more figure, where the others are looked for too."""
     import postproc.figures
 
@@ -88,7 +88,7 @@ def invoke(*args: str) -> str:
 
 
 @pytest.mark.usefixtures("toy")
-def test_a_file_with_a_function_of_its_name_is_a_command() -> None:
+def test_a_file_with_a_function_of_its_name_is_a_command():
     assert "\n  toy          Bars of the largest measure." in invoke("--help")
     shown = " ".join(invoke("toy", "--help").split())
     for text in (
@@ -105,7 +105,7 @@ def test_a_file_with_a_function_of_its_name_is_a_command() -> None:
 
 
 @pytest.mark.usefixtures("toy")
-def test_its_lines_are_printed_and_its_figure_is_saved(tmp_path: Path) -> None:
+def test_its_lines_are_printed_and_its_figure_is_saved(tmp_path):
     synthetic_store.write(tmp_path / "study.zarr", synthetic_store.make())
     printed = invoke("toy", "study.zarr", "--bars", "2", "--side", "right", "--mark", "a=3 Hz").splitlines()
     assert printed[0].endswith(", 2 bars on the right, {'a': '3 Hz'}")
@@ -113,7 +113,7 @@ def test_its_lines_are_printed_and_its_figure_is_saved(tmp_path: Path) -> None:
     assert Path("study_toy.png").exists()
 
 
-def test_it_is_a_method_of_a_store(toy: Path) -> None:
+def test_it_is_a_method_of_a_store(toy):
     synthetic_store.write(Path("study.zarr"), synthetic_store.make())
     script = (
         f"import matplotlib, postproc.figures; postproc.figures.__path__.append({str(toy)!r})\n"
@@ -127,7 +127,7 @@ def test_it_is_a_method_of_a_store(toy: Path) -> None:
     subprocess.run([sys.executable, "-c", script], env=environment, check=True, timeout=120)
 
 
-def test_every_option_has_its_help_and_every_figure_its_summary() -> None:
+def test_every_option_has_its_help_and_every_figure_its_summary():
     for figure in figures().values():
         assert figure.summary.endswith(".")
         assert len(figure.summary) < 70
