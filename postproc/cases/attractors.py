@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import xarray as xr
 
-from postproc.store.axes import axes_of, drawn_axes, source
+from postproc.store.axes import axes_of, drawn_axes, refusal
 from postproc.store.variables import require_variables
-from rubhpc.errors import InputError
 from rubhpc.schema import DONE, INFERRED, REGIME, SECTION_NAMES
 from rubhpc.study.axes import coordinate_of
 from rubhpc.study.initial import PREFIX
@@ -61,12 +60,13 @@ def start_axes(store: xr.Dataset) -> list[str]:
         others = [name for name in drawn if not name.startswith(_START)]
         if others:
             problem = f"{others[0]} was drawn along with the starts, so that no two cases share a setting"
-            raise InputError(f"{source(store)}: basins: {problem}; make it an axis of the grid")
+            raise refusal(store, f"basins: {problem}; make it an axis of the grid")
         starts.append(CASE)
     if not starts:
-        raise InputError(
-            f"{source(store)}: basins need starts that differ: an axis of [grid] such as "
-            f'"{PREFIX}vertical" = {{ start = "-1 mm", stop = "1 mm", num = 21 }}'
+        raise refusal(
+            store,
+            "basins need starts that differ: an axis of [grid] such as "
+            f'"{PREFIX}vertical" = {{ start = "-1 mm", stop = "1 mm", num = 21 }}',
         )
     return starts
 

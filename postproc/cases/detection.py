@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from postproc.signals.indicators import INDICATORS
-from postproc.store.axes import source
+from postproc.store.axes import refusal
 from rubhpc.errors import InputError
 from rubhpc.schema import DONE, REGIME
 
@@ -113,9 +113,10 @@ def _halves(
     if fewest < _LEAST:
         n_free, n_rub = int((done & ~rub).sum()), int((done & rub).sum())
         which = "smaller clearances" if n_rub < n_free else "clearances above the contact-free amplitude"
-        raise InputError(
-            f"{source(data)}: {n_free} selected cases without contact and {n_rub} with it are too few to "
-            f"learn from; use some {4 * _LEAST} of each, the others by {which} in the study"
+        raise refusal(
+            data,
+            f"{n_free} selected cases without contact and {n_rub} with it are too few to "
+            f"learn from; use some {4 * _LEAST} of each, the others by {which} in the study",
         )
     return halves
 

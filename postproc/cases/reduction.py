@@ -19,11 +19,10 @@ import xarray as xr
 
 from postproc.cases.workers import computed as computed
 from postproc.signals.spectra import spectrum_of, with_frequency
-from postproc.store.axes import axes_of, find_axis, source
+from postproc.store.axes import axes_of, find_axis, refusal
 from postproc.store.open import open_arrays, open_store
 from postproc.store.select import select, worst_of_stators
 from postproc.store.variables import LONG_ROLES, require_measure
-from rubhpc.errors import InputError
 from rubhpc.schema import DONE, HAS_VALUES, role_of
 
 if TYPE_CHECKING:
@@ -168,7 +167,7 @@ def histogram(
     values, axes = _done(store, measure, over)
     known = values.values[np.isfinite(values.values)]
     if not known.size:
-        raise InputError(f"{source(store)}: {measure}: no selected case has a value; select others")
+        raise refusal(store, f"{measure}: no selected case has a value; select others")
     edges = np.histogram_bin_edges(known, bins)
     others = [d for d in values.dims if d not in axes]
     rows = values.transpose(*others, *axes)
@@ -209,7 +208,7 @@ def _axes(store: xr.Dataset, values: xr.DataArray, over: Iterable[str]) -> list[
     """Return the dimensions to reduce; all of the study's axes when none is named."""
     axes = [find_axis(store, name) for name in over] or list(axes_of(store))
     if lost := [a for a in axes if a not in values.dims]:
-        raise InputError(f"{source(store)}: {values.name}: does not depend on {lost[0]}; leave that one out")
+        raise refusal(store, f"{values.name}: does not depend on {lost[0]}; leave that one out")
     return axes
 
 

@@ -14,9 +14,8 @@ import numpy as np
 import xarray as xr
 
 from postproc.store.attributes import table_of
-from postproc.store.axes import drawn_axes, source
+from postproc.store.axes import drawn_axes, refusal
 from postproc.store.units import displayed
-from rubhpc.errors import InputError
 from rubhpc.study.axes import coordinate_of
 from rubhpc.study.sampling import cases_per_point
 from rubhpc.study.tables import SALTELLI
@@ -122,15 +121,17 @@ def by_point(values: xr.DataArray, store: xr.Dataset) -> Floats:
     """
     sample = table_of(store, "study").get("sample", {})
     if (method := sample.get("method", SALTELLI)) != SALTELLI:
-        raise InputError(
-            f'{source(store)}: its sample was drawn with method = "{method}", and Sobol indices need '
-            'Saltelli\'s design; run the study with [sample] method = "sobol" into another output'
+        raise refusal(
+            store,
+            f'its sample was drawn with method = "{method}", and Sobol indices need '
+            'Saltelli\'s design; run the study with [sample] method = "sobol" into another output',
         )
     shape = (int(sample.get("n", 0)), cases_per_point(len(drawn_axes(store))))
     if values.size != math.prod(shape):
-        raise InputError(
-            f"{source(store)}: {values.size} of the {math.prod(shape)} cases of the sample are selected, and "
-            "its indices need all of them; select nothing of what was drawn"
+        raise refusal(
+            store,
+            f"{values.size} of the {math.prod(shape)} cases of the sample are selected, and "
+            "its indices need all of them; select nothing of what was drawn",
         )
     rows: Floats = values.values.reshape(shape)
     return rows

@@ -21,7 +21,7 @@ from postproc.signals.indicators import rms_about_mean
 from postproc.signals.sensors import Sensor, check_rate
 from postproc.signals.spectra import check_signal, samples_per_revolution
 from postproc.store.attributes import MEASURED
-from postproc.store.axes import axes_of, source
+from postproc.store.axes import axes_of, refusal
 from postproc.store.branch_points import is_of_points
 from postproc.store.case_table import import_parquet, metadata_of
 from postproc.store.run_ups import is_run_up
@@ -93,7 +93,7 @@ def write_dataset(
     check_shares(shares)
     if is_of_points(store) or MEASURED in store.attrs:
         problem = "has no simulated waveforms, whose contacts are known"
-        raise InputError(f"{source(store)}: {problem}; give the store of a study of cases or run-ups")
+        raise refusal(store, f"{problem}; give the store of a study of cases or run-ups")
     waves = _waves_of(store, signals)
     is_done = store["status"].values.ravel() == DONE
     require_results(np.where(is_done, 0.0, math.nan), store)
@@ -198,7 +198,7 @@ def _rate(store: xr.Dataset, n_sample: int, rate: float | None) -> float:
     check_rate(rate)
     if n_sample > int(shortest * rate):
         problem = f"{n_sample} samples at {rate:g} Hz take longer than the shortest record, {shortest:.3g} s"
-        raise InputError(f"{source(store)}: {problem}; use at most --samples {int(shortest * rate)}")
+        raise refusal(store, f"{problem}; use at most --samples {int(shortest * rate)}")
     return rate
 
 

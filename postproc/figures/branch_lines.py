@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from postproc.figures.palette import categories
-from postproc.store.axes import source
+from postproc.store.axes import refusal
 from postproc.store.branch_points import followed, is_of_points, other_axes
 from postproc.store.units import displayed, scale_of
-from rubhpc.errors import InputError
 from rubhpc.schema import BRANCH_EVENT
 
 if TYPE_CHECKING:
@@ -105,19 +104,17 @@ def events_at(points: xr.Dataset, shown: xr.Dataset, x: str, y: str) -> xr.Datas
     InputError where the store has no branches, or they do not run in this plane.
     """
     if not is_of_points(points):
-        raise InputError(
-            f"{source(points)}: events: has no branches; give the store of a study with [branch]"
-        )
+        raise refusal(points, "events: has no branches; give the store of a study with [branch]")
     lacking = [name for name in (x, y) if name not in points.coords]
     if lacking or followed(points) not in (x, y):
         why = f"its branches follow {followed(points)}, the map is over {x} and {y}"
-        raise InputError(f"{source(points)}: events: {why}; choose axes with --x and --y")
+        raise refusal(points, f"events: {why}; choose axes with --x and --y")
     is_here = np.isin(points["event"].values, [BRANCH_EVENT.index(name) for name in MARKED])
     for name in other_axes(points):
         if name not in (x, y) and name in shown.coords and shown[name].ndim == 0:
             is_here &= np.isclose(points[name].values, float(shown[name]), rtol=1e-6)
     if not is_here.any():
-        raise InputError(f"{source(points)}: events: there is none at the values of the map; select others")
+        raise refusal(points, "events: there is none at the values of the map; select others")
     return points.isel(point=np.flatnonzero(is_here))
 
 

@@ -14,7 +14,7 @@ from postproc.figures.drawing import Drawing
 from postproc.figures.palette import CATEGORIES, NOT_DONE, NOT_SETTLED, WARNING, coloured, paint_of
 from postproc.figures.scatter import mark_cases, mark_size
 from postproc.figures.small_multiples import color_bar, legend_below, name_facets, write_over
-from postproc.store.axes import drawn_axes, source
+from postproc.store.axes import drawn_axes, refusal
 from postproc.store.open import open_store
 from postproc.store.rig_of_case import model_of
 from postproc.store.select import first_of_rest, worst_of_stators
@@ -84,11 +84,11 @@ def map(  # noqa: A001 - the name of the command
     named = [facet] if isinstance(facet, str) else list(facet)
     is_sample = bool(drawn_axes(cases))
     if is_sample and contours:
-        raise InputError(f"{source(cases)}: map: points of a sample have no contours; leave --contours out")
+        raise refusal(cases, "map: points of a sample have no contours; leave --contours out")
     if is_sample and computed:
-        raise InputError(f"{source(cases)}: map: all cases of a sample are computed; leave --computed out")
+        raise refusal(cases, "map: all cases of a sample are computed; leave --computed out")
     if events is not None and (is_sample or named):
-        raise InputError(f"{source(cases)}: map: events go over one map of a grid; leave --facet out")
+        raise refusal(cases, "map: events go over one map of a grid; leave --facet out")
     across, up = scatter_axes(cases, x, y) if is_sample else default_axes(cases, x, y, named)
     spread = [CASE] if is_sample else [across, up]
     facets = facet_axes(cases, named, spread)

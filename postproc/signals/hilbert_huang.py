@@ -246,4 +246,7 @@ def _quantiles(one: xr.Dataset, inside: NDArray[np.bool_], shares: tuple[float, 
     if not inside.any():
         return [math.nan] * len(shares)
     weights = amplitude[inside]
-    return np.quantile(frequency[inside], shares, weights=weights, method="inverted_cdf").tolist()
+    found: list[float] = np.quantile(
+        frequency[inside], shares, weights=weights, method="inverted_cdf"
+    ).tolist()
+    return found

@@ -15,7 +15,7 @@ import xarray as xr
 
 from postproc.signals.sensors import Sensor
 from postproc.signals.spectra import samples_per_revolution
-from postproc.store.axes import axes_of, source
+from postproc.store.axes import axes_of, refusal, source
 from postproc.store.rig_of_case import natural_frequencies, rig_axes, stator_frequencies
 from postproc.store.select import narrow
 from postproc.store.variables import require_results
@@ -106,7 +106,7 @@ def indicator_scores(
         (free, "stays free of contact", "take clearances above the contact-free amplitude"),
     ):
         if not mask.any():
-            raise InputError(f"{source(store)}: no selected case {kind}; {fix} into the study")
+            raise refusal(store, f"no selected case {kind}; {fix} into the study")
     n = samples_per_revolution(data[CHANNELS[0]])
     n_turn = data.sizes["sample"] // n
     data = data.isel(sample=slice(-n * (n_turn // _WHOLE * _WHOLE or n_turn), None))
@@ -114,9 +114,10 @@ def indicator_scores(
     highest = (1 + _BAND) * frequencies["stator"] / (data["spin_speed"] / (2 * math.pi))
     if float(highest.max()) >= n / 2:
         least = math.ceil(2 * float(highest.max())) + 1
-        raise InputError(
-            f"{source(store)}: {n} samples a revolution do not resolve the stator's vibration at the lowest "
-            f"speed; use at least {least}, or select faster cases"
+        raise refusal(
+            store,
+            f"{n} samples a revolution do not resolve the stator's vibration at the lowest "
+            f"speed; use at least {least}, or select faster cases",
         )
     reference = [float(rms_about_mean(data[name]).where(rub).median()) for name in CHANNELS]
     waves = [data[name] for name in CHANNELS]
@@ -163,13 +164,13 @@ def _natural(data: xr.Dataset) -> dict[str, xr.DataArray]:
     keys = [data[key] for key in rig_axes(data) if key in data.coords]
     along = list(dict.fromkeys(str(dim) for key in keys if key.size > 1 for dim in key.dims))
     if len(along) > 1:
-        raise InputError(f"{source(data)}: select one value of {' or of '.join(along)}")
+        raise refusal(data, f"select one value of {' or of '.join(along)}")
     axis = along[0] if along else None
     rotor = natural_frequencies(data, axis)
     each = [data.isel(stator=i) for i in range(data.sizes["stator"])] if "stator" in data.dims else [data]
     stators = [stator_frequencies(case, axis) for case in each]
     if "torsional" not in rotor or any("lateral" not in stator for stator in stators):
-        raise InputError(f"{source(data)}: no natural frequency of torsion or stator; use another rig")
+        raise refusal(data, "no natural frequency of torsion or stator; use another rig")
     lateral = [stator["lateral"] for stator in stators]
     stator = xr.concat(lateral, "stator") if "stator" in data.dims else lateral[0]
     return {"torsion": rotor["torsional"], "stator": stator}

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from postproc.signals.spectra import check_signal, samples_per_revolution
-from postproc.store.axes import axes_of, find_axis, source
+from postproc.store.axes import axes_of, find_axis, refusal
 from postproc.store.run_ups import is_run_up
 from postproc.store.select import narrow
 from rubhpc.errors import InputError
@@ -153,7 +153,7 @@ def _with_contact(store: xr.Dataset, names: Sequence[str]) -> tuple[xr.Dataset, 
 def _of_cases(store: xr.Dataset, signals: Sequence[str], order: float, over: str | None) -> xr.Dataset:
     along = next((axis for axis in axes_of(store) if axis in SPEED_AXES), None)
     if along is None or store.sizes[along] < 2:
-        raise InputError(f"{source(store)}: bode needs an axis of several speeds; give another store")
+        raise refusal(store, "bode needs an axis of several speeds; give another store")
     spread = [along, *([find_axis(store, over)] if over else [])]
     store, touched = _with_contact(store, ["contact_fraction"])
     data = narrow(store, [*signals, *touched, "spin_speed"], spread).load()
@@ -163,7 +163,7 @@ def _of_cases(store: xr.Dataset, signals: Sequence[str], order: float, over: str
         turns = data.sizes["sample"] // n
         if abs(turns * order - round(turns * order)) > WHOLE:
             problem = f"{turns} revolutions hold no whole number of periods of order {order:g}"
-            raise InputError(f"{source(store)}: {problem}; record a multiple of its period")
+            raise refusal(store, f"{problem}; record a multiple of its period")
         dims = [dim for dim in data[signal].dims if dim != "sample"]
         rows = data[signal].transpose(*dims, "sample").values.astype(float)
         turning = np.exp(-2j * np.pi * order / n * np.arange(rows.shape[-1]))
@@ -174,7 +174,7 @@ def _of_cases(store: xr.Dataset, signals: Sequence[str], order: float, over: str
     speed = data["spin_speed"]
     if speed.dims != (along,):
         problem = f"the speeds depend on {', '.join(str(d) for d in speed.dims if d != along)} too"
-        raise InputError(f"{source(store)}: {problem}; select one value of it")
+        raise refusal(store, f"{problem}; select one value of it")
     coords = {name: at for name, at in data.coords.items() if "sample" not in at.dims and name != "speed"}
     found = xr.Dataset(variables, coords=coords)
     found = found.assign_coords(speed=(along, speed.values))

@@ -9,10 +9,9 @@ import numpy as np
 import xarray as xr
 
 from postproc.signals.spectra import WHIRL, check_signal, samples_per_revolution
-from postproc.store.axes import find_axis, source
+from postproc.store.axes import find_axis, refusal
 from postproc.store.run_ups import first_around, is_run_up
 from postproc.store.select import narrow
-from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -52,7 +51,7 @@ def run_up_spectra(
     data, per_revolution, n = _case(store, ["vertical", "horizontal"] if is_full else [signal])
     if n <= FEWEST:
         problem = f"this run-up has {n} revolutions, too few for spectra over its speed"
-        raise InputError(f"{source(store)}: {problem}; draw it with rubhpc waveform")
+        raise refusal(store, f"{problem}; draw it with rubhpc waveform")
     window = min(window, max(n // 2, FEWEST))
     speed = data["speed"].values[:n]
     starts = np.unique(np.linspace(0, n - window, count).round().astype(int))
@@ -119,13 +118,11 @@ def _case(store: xr.Dataset, signals: Sequence[str]) -> tuple[xr.Dataset, int, i
     for signal in signals:
         check_signal(signal, store)
     if not is_run_up(store):
-        raise InputError(
-            f"{source(store)}: its speed is constant; give a run-up, as of a study with [run_up]"
-        )
+        raise refusal(store, "its speed is constant; give a run-up, as of a study with [run_up]")
     data = narrow(store, [*signals, "speed"]).load()
     n = int(np.isfinite(data["speed"].values).sum())
     if not n:
-        raise InputError(f"{source(store)}: this run-up has no whole revolution; select another case")
+        raise refusal(store, "this run-up has no whole revolution; select another case")
     return data, samples_per_revolution(data), n
 
 
@@ -150,7 +147,7 @@ def spin_over_time(store: xr.Dataset, over: str | None = None) -> xr.Dataset:
         The speed is constant, or several cases are left.
     """
     if not is_run_up(store):
-        raise InputError(f"{source(store)}: its speeds are constant; give a store with [run_up] or [drive]")
+        raise refusal(store, "its speeds are constant; give a store with [run_up] or [drive]")
     prefix = _PREFIX if _PREFIX + _TORQUES[1] in store else ""
     is_driven = prefix + _TORQUES[1] in store
     names = ["speed", "time", *([prefix + name for name in _TORQUES] if is_driven else [])]

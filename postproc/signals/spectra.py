@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from postproc.store.attributes import MEASURED
-from postproc.store.axes import find_axis, source
+from postproc.store.axes import find_axis, refusal
 from postproc.store.select import narrow
 from postproc.store.variables import require_variables
 from rubhpc import spectra
@@ -82,9 +82,9 @@ def spectrum_of(store: xr.Dataset, signal: str) -> xr.DataArray:
         return store[stored]
     if signal in store:
         return amplitude_spectrum(store[signal])
-    raise InputError(
-        f"{source(store)}: keeps neither {stored} nor the waveform {signal}; "
-        'run the study with "spectrum" in [record] keep'
+    raise refusal(
+        store,
+        f'keeps neither {stored} nor the waveform {signal}; run the study with "spectrum" in [record] keep',
     )
 
 

@@ -10,11 +10,10 @@ import xarray as xr
 
 from postproc.signals.spectra import check_signal, samples_per_revolution
 from postproc.store.attributes import MEASURED
-from postproc.store.axes import find_axis, source
+from postproc.store.axes import find_axis, refusal
 from postproc.store.rig_of_case import bores_around, is_carried, rig_of, stator_places, stators_around
 from postproc.store.run_ups import first_around, is_run_up
 from postproc.store.select import narrow
-from rubhpc.errors import InputError
 from rubhpc.schema import CONTACT_ANGLE, is_signal
 
 if TYPE_CHECKING:
@@ -121,7 +120,7 @@ def _kept(
     n = samples_per_revolution(data["revolution"])
     if not is_run_up(store):
         if at is not None:
-            raise InputError(f"{source(store)}: at: its speeds are constant; select one of them")
+            raise refusal(store, "at: its speeds are constant; select one of them")
         return data if revolutions is None else data.isel(sample=slice(-revolutions * n, None))
     spread = [find_axis(store, over)] if over else []
     speed = narrow(store, ["speed"], spread)["speed"]

@@ -19,6 +19,11 @@ def source(store: xr.Dataset) -> str:
     return str(store.encoding.get("source", "this store"))
 
 
+def refusal(store: xr.Dataset, problem: str) -> InputError:
+    """Return the error of a problem with a store, which names its path."""
+    return InputError(f"{source(store)}: {problem}")
+
+
 def axes_of(store: xr.Dataset) -> tuple[str, ...]:
     """Return the study's axes that are left, in the order of its grid; none for a single record."""
     return tuple(str(d) for d in store["status"].dims) if "status" in store else ()
@@ -35,7 +40,7 @@ def ordered_axes(store: xr.Dataset, figure: str) -> list[str]:
         left = what if drawn_axes(store) else "this selection is one case"
         if "revolution" in store.dims:
             left = "the speed of this case changes, rubhpc waterfall draws it"
-        raise InputError(f"{source(store)}: {figure} needs an axis of several values; {left}")
+        raise refusal(store, f"{figure} needs an axis of several values; {left}")
     return axes
 
 
@@ -58,12 +63,13 @@ def find_axis(store: xr.Dataset, name: str) -> str:
     if axis in known:
         return axis
     if axis in store.coords and store.coords[axis].ndim == 0:
-        raise InputError(f"{source(store)}: {name}: is selected already; select it once")
+        raise refusal(store, f"{name}: is selected already; select it once")
     if axis in drawn_axes(store):
-        raise InputError(
-            f"{source(store)}: {name}: was drawn at random and is not an axis; rubhpc map draws measures "
-            "over drawn quantities"
+        raise refusal(
+            store,
+            f"{name}: was drawn at random and is not an axis; rubhpc map draws measures "
+            "over drawn quantities",
         )
     near = difflib.get_close_matches(axis, known, n=1)
     hint = f"did you mean {near[0]}?" if near else f"the axes are {', '.join(known) or 'none'}"
-    raise InputError(f"{source(store)}: no axis {name}; {hint}")
+    raise refusal(store, f"no axis {name}; {hint}")

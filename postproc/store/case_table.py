@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from postproc.store.axes import axes_of, source
+from postproc.store.axes import axes_of, refusal
 from postproc.store.export import complete, heading
 from postproc.store.select import worst_of_stators
 from rubhpc.errors import InputError
@@ -38,9 +38,9 @@ def case_table(store: xr.Dataset, names: Sequence[str] = ()) -> xr.Dataset:
     known = [str(n) for n, v in store.data_vars.items() if set(v.dims) <= {*axes, "stator"}]
     for name in names:
         if name not in known:
-            raise InputError(
-                f"{source(store)}: {name}: has many values a case, and a table has one row a case; export it "
-                "as .h5 or .nc"
+            raise refusal(
+                store,
+                f"{name}: has many values a case, and a table has one row a case; export it as .h5 or .nc",
             )
     chosen = [name for name in known if not names or name in names]
     data = worst_of_stators(store, chosen)

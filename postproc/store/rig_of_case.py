@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 
 from postproc.store.attributes import MEASURED, table_of
-from postproc.store.axes import source
-from rubhpc.errors import InputError
+from postproc.store.axes import refusal, source
 from rubhpc.models import ABSENT, in_words
 from rubhpc.rig.reading import rig_from_dict, with_keys
 from rubhpc.rig.stators import Stator, geometries
@@ -37,7 +36,7 @@ def rig_of(case: xr.Dataset, values: Mapping[str, float] | None = None) -> Rig:
             if MEASURED in case.attrs
             else "give a store that rubhpc has written"
         )
-        raise InputError(f"{source(case)}: contains no rig; {fix}")
+        raise refusal(case, f"contains no rig; {fix}")
     rig = rig_from_dict(table, f"{source(case)}: rig")
     chosen = {
         str(n): float(c.values.item())
