@@ -63,8 +63,7 @@ def indicator_scores(
     Noise of level 1 is, in each channel, white Gaussian noise whose rms in 1 kHz is that channel's median
     vibration over the cases that touch, and, as strong again, benign harmonics: random 1X, 2X and 3X such as
     misalignment or a drive bring in (`sensors.Sensor`). A case's draws depend on `seed` and its place in the
-    study only, and are the same
-    at all levels.
+    study only, and are the same at all levels.
 
     Parameters
     ----------

@@ -135,16 +135,12 @@ def _kept(
     same = np.unique(ends[turned > 0])
     if same.size == 1:
         return data.isel(sample=slice((int(same[0]) - count) * n, int(same[0]) * n))
-    before = {"sample": slice(0, count * n)}
-    shifts = xr.DataArray(count - ends, dims=spread)
-    rows = [
-        data.isel({spread[0]: i}).drop_vars("revolution").shift(sample=int(shift) * n).isel(before)
-        for i, shift in enumerate(shifts.values)
-    ]
+    first = xr.DataArray(np.maximum(ends - count, 0) * n, dims=spread)  # where a case has no revolution: NaN
+    rows = data.drop_vars("revolution").isel(sample=first + xr.DataArray(np.arange(count * n), dims="sample"))
     place = np.arange(count * n) / n - (count if at is None else count // 2)
     where = "the end" if at is None else "that at the speed"
     about = {"units": "1", "long_name": f"revolution, from {where}"}
-    return xr.concat(rows, spread[0]).assign_coords(revolution=("sample", place, about))
+    return rows.assign_coords(revolution=("sample", place, about))
 
 
 def _ends_around(
