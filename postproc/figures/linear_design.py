@@ -69,8 +69,6 @@ def campbell_diagram(
     drawn = set()
     for i_mode, kind in enumerate(curves["kind"].values):
         words = [whirl if kind == "lateral" else kind for whirl in curves["whirl"].values[i_mode]]
-        if np.isnan(frequency[i_mode]).all():
-            continue
         for word, part in _stretches(words):
             ax.plot(rpm[part], frequency[i_mode, part], **STYLES[word])
             at = frequency[i_mode, part]
