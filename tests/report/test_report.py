@@ -138,9 +138,10 @@ def test_validity_counts_what_is_out_of_range(two_stator_path):
     assert reported["Tip deflection over length"] == 0
 
 
-def test_slip_may_reverse_under_coulombs_law(two_stator_path):
+@pytest.mark.parametrize("law", ["coulomb", "stribeck", "table"])
+def test_slip_may_reverse_without_steady_sliding(two_stator_path, law):
     dataset = open_store(two_stator_path)
-    study = {**table_of(dataset, "study"), "contact": {"friction_law": "coulomb"}}
+    study = {**table_of(dataset, "study"), "contact": {"friction_law": law}}
     text = Page(dataset.assign_attrs(study=study)).html(values={})
     assert "Contact force over Euler load" in text
     assert "contradicts steady sliding" not in text
