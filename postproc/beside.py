@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from postproc.figures.drawing import Drawing
+from postproc.signals.spectra import samples_per_revolution
 from postproc.store.axes import axes_of
 from postproc.store.run_ups import is_run_up
 from postproc.store.select import narrow
@@ -34,12 +35,7 @@ def figure_beside(
     """Return the drawing of some cases and of what was measured; `has_data`: its data are written too.
 
     One case at a constant speed and a record of that kind, or two run-ups, are drawn over one another where
-    the figure has the option `over`.
-
-    Raises
-    ------
-    InputError
-        The figure cannot be drawn of one of the two.
+    the figure has the option `over`. InputError where the figure cannot be drawn of one of the two.
     """
     signals = [str(name) for name in found.data_vars if is_signal(str(name)) and name in cases]
     if not signals:
@@ -69,8 +65,7 @@ def samples_of(cases: xr.Dataset) -> int:
     name = TURNED if TURNED in cases.coords else "revolution"
     if name not in cases.coords or "sample" not in cases[name].dims:
         raise InputError("--measured: this store has no waveforms; draw the measured file by itself")
-    at = cases[name].values
-    return round(1.0 / float(at[1] - at[0]))
+    return samples_per_revolution(cases)
 
 
 def _is_one(cases: xr.Dataset) -> bool:
@@ -84,7 +79,7 @@ def together(cases: xr.Dataset, found: xr.Dataset, signals: Sequence[str]) -> xr
     """
     names = [*signals, *(name for name in (*_OF_RUN_UPS, *_OF_CASES) if name in cases and name in found)]
     names += [what + name for what in (AMPLITUDE, PHASE) for name in signals if what + name in cases]
-    rows = [(narrow(one, names) if "status" in one else one[names]).load() for one in (cases, found)]
+    rows = [narrow(one, names).load() for one in (cases, found)]
     if not is_run_up(cases):
         least = min(one.sizes["sample"] for one in rows)
         rows = [one.isel(sample=slice(-least, None)) for one in rows]

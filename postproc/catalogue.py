@@ -31,24 +31,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Option:
-    """An option of a figure, as its function declares it.
-
-    Attributes
-    ----------
-    kind : {bool, int, float, str}
-        Of one value, as a command line gives it.
-    form : {"one", "two", "many", "pairs"}
-        One value, two of them, a sequence, or a mapping of names to them.
-    choices : tuple of str
-        All values there are; empty where any is allowed.
-    """
+    """An option of a figure, as its function declares it."""
 
     name: str
     default: Any
     help: str
-    kind: type
-    form: Literal["one", "two", "many", "pairs"] = "one"
-    choices: tuple[str, ...] = ()
+    kind: type  # bool, int, float or str, of one value
+    form: Literal["one", "two", "many", "pairs"] = "one"  # a sequence, or a mapping of names to values
+    choices: tuple[str, ...] = ()  # all values there are; none where any is allowed
     bounds: Bounds | None = None
     metavar: str | None = None
 
@@ -62,32 +52,18 @@ class Option:
 
 @dataclass(frozen=True, kw_only=True)
 class Figure:
-    """A figure and its declaration.
-
-    Attributes
-    ----------
-    name : str
-        Of the file, the function, the command and the method of `store.rub`.
-    summary, description : str
-        The first line of the docstring, and all of it above the parameters.
-    parameters : tuple of Parameter
-        Of the function, without the cases; their annotations are plain types.
-    options : mapping of name to Option
-    """
+    """A figure and its declaration, named as its file, function, command and method."""
 
     name: str
-    summary: str
-    description: str
-    parameters: tuple[inspect.Parameter, ...]
+    summary: str  # the first line of the docstring
+    description: str  # all of it above the parameters
+    parameters: tuple[inspect.Parameter, ...]  # without the cases; their annotations are plain types
     options: Mapping[str, Option]
 
     def of(self, cases: xr.Dataset, *args: Any, **words: Any) -> Drawing:
         """Return the drawing of some cases; `args` and `words` are those of the figure's function.
 
-        Raises
-        ------
-        InputError
-            A value is none of those offered or out of range, or the cases cannot be drawn so.
+        InputError where a value is none of those offered or out of range, or the cases cannot be drawn so.
         """
         from postproc.cases.maps import verdict_of
         from postproc.signals.places import named_places
@@ -115,7 +91,7 @@ def _read(file: Path) -> Figure | None:
         return None
     node = next(n for n in ast.parse(source).body if isinstance(n, ast.FunctionDef) and n.name == file.stem)
     description, _, sections = (ast.get_docstring(node) or "").partition("\n\nParameters\n")
-    described = dict(_entries(sections))
+    described = vocabulary.HELP | dict(_entries(sections))
     stub = _stub(node, file)
     _, *parameters = inspect.signature(stub).parameters.values()
     plain = get_type_hints(stub)

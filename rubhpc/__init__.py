@@ -14,120 +14,78 @@ from typing import TYPE_CHECKING, Any
 from rubhpc.version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from postproc.accessor import open  # noqa: A004 - the public name
-    from postproc.measured.measured import measured
-    from postproc.signals.sensors import Sensor, sense
-    from rubhpc.branch import branch
-    from rubhpc.errors import InputError, NoPeriodicMotion, RubError, StoppedEarly, StoreError
-    from rubhpc.fem.assemble import assemble
-    from rubhpc.fem.dry_whirl import dry_whirl
-    from rubhpc.fem.linear_design import linear_design
-    from rubhpc.identification.identify import Identification, identify
-    from rubhpc.integrate.branches.branch import Branch
-    from rubhpc.integrate.periodic_motion import PeriodicMotion
-    from rubhpc.integrate.record import Record, State
-    from rubhpc.knocks import least_knock
-    from rubhpc.periodic import periodic
-    from rubhpc.rig.carriers import Carrier, MatrixCarrier
-    from rubhpc.rig.probes import Probe
-    from rubhpc.rig.reading import read_rig
-    from rubhpc.rig.rig import Rig
-    from rubhpc.rig.rotors import Harmonic, Load, Unbalance
-    from rubhpc.rig.stators import Bore, LumpedStator, MatrixStator, Stator
-    from rubhpc.run_up import run_up
-    from rubhpc.running.driver import run
-    from rubhpc.simulate import simulate
-    from rubhpc.storage.summary import Summary
-    from rubhpc.study.study import Study, read_study
-    from rubhpc.whirl_simulations import certify_whirl
+    from postproc.accessor import open as open  # noqa: A004 - the public name
+    from postproc.measured.measured import measured as measured
+    from postproc.signals.sensors import Sensor as Sensor
+    from postproc.signals.sensors import sense as sense
+    from rubhpc.branch import branch as branch
+    from rubhpc.errors import InputError as InputError
+    from rubhpc.errors import NoPeriodicMotion as NoPeriodicMotion
+    from rubhpc.errors import RubError as RubError
+    from rubhpc.errors import StoppedEarly as StoppedEarly
+    from rubhpc.errors import StoreError as StoreError
+    from rubhpc.fem.assemble import assemble as assemble
+    from rubhpc.fem.dry_whirl import dry_whirl as dry_whirl
+    from rubhpc.fem.linear_design import linear_design as linear_design
+    from rubhpc.identification.identify import Identification as Identification
+    from rubhpc.identification.identify import identify as identify
+    from rubhpc.integrate.branches.branch import Branch as Branch
+    from rubhpc.integrate.periodic_motion import PeriodicMotion as PeriodicMotion
+    from rubhpc.integrate.record import Record as Record
+    from rubhpc.integrate.record import State as State
+    from rubhpc.knocks import least_knock as least_knock
+    from rubhpc.periodic import periodic as periodic
+    from rubhpc.rig.carriers import Carrier as Carrier
+    from rubhpc.rig.carriers import MatrixCarrier as MatrixCarrier
+    from rubhpc.rig.probes import Probe as Probe
+    from rubhpc.rig.reading import read_rig as read_rig
+    from rubhpc.rig.rig import Rig as Rig
+    from rubhpc.rig.rotors import Harmonic as Harmonic
+    from rubhpc.rig.rotors import Load as Load
+    from rubhpc.rig.rotors import Unbalance as Unbalance
+    from rubhpc.rig.stators import Bore as Bore
+    from rubhpc.rig.stators import LumpedStator as LumpedStator
+    from rubhpc.rig.stators import MatrixStator as MatrixStator
+    from rubhpc.rig.stators import Stator as Stator
+    from rubhpc.run_up import run_up as run_up
+    from rubhpc.running.driver import run as run
+    from rubhpc.simulate import simulate as simulate
+    from rubhpc.storage.summary import Summary as Summary
+    from rubhpc.study.study import Study as Study
+    from rubhpc.study.study import read_study as read_study
+    from rubhpc.whirl_simulations import certify_whirl as certify_whirl
 
-__all__ = [
-    "Bore",
-    "Branch",
-    "Carrier",
-    "Harmonic",
-    "Identification",
-    "InputError",
-    "Load",
-    "LumpedStator",
-    "MatrixCarrier",
-    "MatrixStator",
-    "NoPeriodicMotion",
-    "PeriodicMotion",
-    "Probe",
-    "Record",
-    "Rig",
-    "RubError",
-    "Sensor",
-    "State",
-    "Stator",
-    "StoppedEarly",
-    "StoreError",
-    "Study",
-    "Summary",
-    "Unbalance",
-    "assemble",
-    "branch",
-    "certify_whirl",
-    "dry_whirl",
-    "identify",
-    "least_knock",
-    "linear_design",
-    "measured",
-    "open",
-    "periodic",
-    "read_rig",
-    "read_study",
-    "run",
-    "run_up",
-    "sense",
-    "simulate",
-]
-
-# Module of each name; imported at first use, so that `import rubhpc` is fast.
-_HOMES = {
-    "Bore": "rubhpc.rig.stators:Bore",
-    "Branch": "rubhpc.integrate.branches.branch:Branch",
-    "Carrier": "rubhpc.rig.carriers:Carrier",
-    "Harmonic": "rubhpc.rig.rotors:Harmonic",
-    "Identification": "rubhpc.identification.identify:Identification",
-    "InputError": "rubhpc.errors:InputError",
-    "Load": "rubhpc.rig.rotors:Load",
-    "LumpedStator": "rubhpc.rig.stators:LumpedStator",
-    "MatrixCarrier": "rubhpc.rig.carriers:MatrixCarrier",
-    "MatrixStator": "rubhpc.rig.stators:MatrixStator",
-    "NoPeriodicMotion": "rubhpc.errors:NoPeriodicMotion",
-    "PeriodicMotion": "rubhpc.integrate.periodic_motion:PeriodicMotion",
-    "Probe": "rubhpc.rig.probes:Probe",
-    "Record": "rubhpc.integrate.record:Record",
-    "Rig": "rubhpc.rig.rig:Rig",
-    "RubError": "rubhpc.errors:RubError",
-    "Sensor": "postproc.signals.sensors:Sensor",
-    "State": "rubhpc.integrate.record:State",
-    "Stator": "rubhpc.rig.stators:Stator",
-    "StoppedEarly": "rubhpc.errors:StoppedEarly",
-    "StoreError": "rubhpc.errors:StoreError",
-    "Study": "rubhpc.study.study:Study",
-    "Summary": "rubhpc.storage.summary:Summary",
-    "Unbalance": "rubhpc.rig.rotors:Unbalance",
-    "assemble": "rubhpc.fem.assemble:assemble",
-    "branch": "rubhpc.branch:branch",
-    "certify_whirl": "rubhpc.whirl_simulations:certify_whirl",
-    "dry_whirl": "rubhpc.fem.dry_whirl:dry_whirl",
-    "identify": "rubhpc.identification.identify:identify",
-    "least_knock": "rubhpc.knocks:least_knock",
-    "linear_design": "rubhpc.fem.linear_design:linear_design",
-    "measured": "postproc.measured.measured:measured",
-    "open": "postproc.accessor:open",
-    "periodic": "rubhpc.periodic:periodic",
-    "read_rig": "rubhpc.rig.reading:read_rig",
-    "read_study": "rubhpc.study.study:read_study",
-    "run": "rubhpc.running.driver:run",
-    "run_up": "rubhpc.run_up:run_up",
-    "sense": "postproc.signals.sensors:sense",
-    "simulate": "rubhpc.simulate:simulate",
+# Names by their module; imported at first use, so that `import rubhpc` is fast.
+_BY_MODULE = {
+    "postproc.accessor": ("open",),
+    "postproc.measured.measured": ("measured",),
+    "postproc.signals.sensors": ("Sensor", "sense"),
+    "rubhpc.branch": ("branch",),
+    "rubhpc.errors": ("InputError", "NoPeriodicMotion", "RubError", "StoppedEarly", "StoreError"),
+    "rubhpc.fem.assemble": ("assemble",),
+    "rubhpc.fem.dry_whirl": ("dry_whirl",),
+    "rubhpc.fem.linear_design": ("linear_design",),
+    "rubhpc.identification.identify": ("Identification", "identify"),
+    "rubhpc.integrate.branches.branch": ("Branch",),
+    "rubhpc.integrate.periodic_motion": ("PeriodicMotion",),
+    "rubhpc.integrate.record": ("Record", "State"),
+    "rubhpc.knocks": ("least_knock",),
+    "rubhpc.periodic": ("periodic",),
+    "rubhpc.rig.carriers": ("Carrier", "MatrixCarrier"),
+    "rubhpc.rig.probes": ("Probe",),
+    "rubhpc.rig.reading": ("read_rig",),
+    "rubhpc.rig.rig": ("Rig",),
+    "rubhpc.rig.rotors": ("Harmonic", "Load", "Unbalance"),
+    "rubhpc.rig.stators": ("Bore", "LumpedStator", "MatrixStator", "Stator"),
+    "rubhpc.run_up": ("run_up",),
+    "rubhpc.running.driver": ("run",),
+    "rubhpc.simulate": ("simulate",),
+    "rubhpc.storage.summary": ("Summary",),
+    "rubhpc.study.study": ("Study", "read_study"),
+    "rubhpc.whirl_simulations": ("certify_whirl",),
 }
-
+_HOMES = {name: module for module, names in _BY_MODULE.items() for name in names}
+__all__ = sorted(_HOMES)
 
 # Modules that register what datasets of a function have: the figures of `rub`.
 _BESIDES = {"measured": "postproc.accessor", "run_up": "postproc.accessor"}
@@ -149,8 +107,7 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     if name in _BESIDES:
         import_module(_BESIDES[name])
-    module, _, attribute = _HOMES[name].partition(":")
-    value = getattr(import_module(module), attribute)
+    value = getattr(import_module(_HOMES[name]), name)
     setattr(sys.modules[__name__], name, value)
     return value
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from rubhpc.case_arguments import CaseArguments, case_of, check_count, read_keep
+from rubhpc.case_arguments import CaseArguments, case_of, check_count, recording_of
 from rubhpc.errors import InputError, NoPeriodicMotion, located
 from rubhpc.input.messages import brief
 from rubhpc.input.quantity import parse_quantity
@@ -25,7 +25,6 @@ from rubhpc.rig.rig import Rig
 from rubhpc.rig.stators import gap_problem
 from rubhpc.study.axis_reading import unit_of
 from rubhpc.study.branch_keys import LONGEST_PERIOD, check_followed
-from rubhpc.study.study import Recording
 from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
@@ -36,6 +35,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.branches.branch import Branch
     from rubhpc.integrate.branches.point import Point
     from rubhpc.study.initial import Initial
+    from rubhpc.study.tables import Recording
 
 STEPS = 50  # in the range, where no step is given
 
@@ -130,10 +130,11 @@ def branch(
     if not largest > 0.0:
         raise InputError(f"branch: largest_step: {largest_step} is out of range; it must be above 0")
     operation, begin = _operation(rig, along, first, initial, samples_per_revolution, case)
-    recording = Recording(
+    recording = recording_of(
+        "branch",
         transient=transient,
         samples_per_revolution=samples_per_revolution,
-        keep=read_keep("branch", keep),
+        keep=keep,
     )
     branching = Branching(Family(operation, along, (first, last)), largest)
     seeds = [_first(branching, first, begin, period, recording)]
@@ -217,13 +218,9 @@ def _operation(
         there = {"overrides": {**(given.get("overrides") or {}), along: value}}
     arguments = cast("CaseArguments", given | there)
     one = case_of("branch", rig, arguments, samples_per_revolution=samples_per_revolution, initial=initial)
-    held = {name: given[name] for name in (*SPEEDS, *CLEARANCES) if given.get(name) is not None}
-    numbers = {
-        "speed_ratio": float(held["speed_ratio"]) if "speed_ratio" in held else None,
-        "speed": one.setup.spin if "speed" in held else None,
-        "clearance_ratio": float(held["clearance_ratio"]) if "clearance_ratio" in held else None,
-        "clearance": one.clearance if "clearance" in held else None,
-    }
+    found = {"speed": one.setup.spin, "clearance": one.clearance}
+    held = [name for name in (*SPEEDS, *CLEARANCES) if given.get(name) is not None]
+    numbers = {name: found[name] if name in found else float(given[name]) for name in held}
     operation = Operation(
         rig=one.rig,
         friction=one.friction,

@@ -25,10 +25,11 @@ from rubhpc.rig.probes import Probe
 from rubhpc.rig.reading import packaged_name, read_rig, with_keys
 from rubhpc.rig.rig import Rig
 from rubhpc.rig.stators import gap_problem
-from rubhpc.study.contact_keys import ContactArguments
-from rubhpc.study.initial import Initial, check_initials
+from rubhpc.study.contact_keys import Contact, ContactArguments
+from rubhpc.study.initial import Initial
 from rubhpc.study.state_of_case import with_state
-from rubhpc.study.study import Contact, Integrator
+from rubhpc.study.table_axes import check_initials
+from rubhpc.study.tables import Integrator, Recording
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -86,14 +87,13 @@ class Case:
     note: str  # what is wrong with the rig at this speed, or ""
 
 
-def read_keep(caller: str, keep: object) -> tuple[str, ...]:
-    """Return what a record contains besides its measures; one name needs no list."""
+def recording_of(caller: str, *, keep: object = (), **keys: Any) -> Recording:
+    """Return the table [record] of the arguments of `caller`; one name to `keep` needs no list."""
     names = [keep] if isinstance(keep, str) else keep
-    if not isinstance(names, Iterable):
-        raise InputError(
-            f'{caller}: keep: {brief(keep)} is not a list of names; give one such as ("section",)'
-        )
-    return tuple(names)
+    with located(f"{caller}: "):
+        if not isinstance(names, Iterable):
+            raise InputError(f'keep: {brief(keep)} is not a list of names; give one such as ("section",)')
+        return Recording(keep=tuple(names), **keys)
 
 
 def pick(arguments: Mapping[str, object]) -> CaseArguments:
@@ -114,11 +114,6 @@ def case_of(
     """Check the arguments of `caller` and assemble its case; `drive` turns it where its speed is free.
 
     Calls with the same rig and speed share what they assemble, tables of contact modes included.
-
-    Raises
-    ------
-    InputError
-        If an argument cannot be used; its text says which one and how to fix it.
     """
     known = CaseArguments.__annotations__
     for name in given:
@@ -146,7 +141,9 @@ def _assembled(
 ) -> Case:
     """Check and assemble all of a case but where it starts."""
     contact = _declared(Contact, given, caller)
-    rig = with_keys(rig, given.get("overrides") or {}).with_geometry(chosen("geometry", contact.model))
+    with located(f"{caller}: overrides: "):
+        rig = with_keys(rig, given.get("overrides") or {})
+    rig = rig.with_geometry(chosen("geometry", contact.model))
     speed, speed_ratio = given.get("speed"), given.get("speed_ratio")
     clearance, clearance_ratio = given.get("clearance"), given.get("clearance_ratio")
     if (speed is None) == (speed_ratio is None):
@@ -223,13 +220,13 @@ def read_probes(caller: str, probes: Sequence[Probe | Mapping[str, object]]) -> 
 def _declared(kind: type[T], given: CaseArguments, caller: str) -> T:
     """A table of the study file from the arguments that are named as its keys; absent ones have defaults."""
     declared = {field.name: field for field in fields(cast("Any", kind))}
-    return kind(
-        **{
-            name: parse_field(declared[name], value, f"{caller}: {name}")
-            for name, value in given.items()
-            if name in declared and value is not None
-        }
-    )
+    values = {
+        name: parse_field(declared[name], value, f"{caller}: {name}")
+        for name, value in given.items()
+        if name in declared and value is not None
+    }
+    with located(f"{caller}: "):
+        return kind(**values)
 
 
 def _read_initial(caller: str, initial: object) -> State | Initial:

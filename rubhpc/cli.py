@@ -24,39 +24,32 @@ from rubhpc.running.launch import FIRST_SPEAKS, launch, leave
 from rubhpc.streams import lasting_streams
 from rubhpc.threads import VARIABLES
 
-# name -> (where it is, what it does). The figure commands come from `postproc.catalogue`.
+# name -> (module and function in `rubhpc.commands`, what it does).
+# The figure commands come from `postproc.catalogue`.
+# Words of click, and plain ones.
+_PLAIN = {
+    "a valid integer range": "a whole number",
+    "a valid integer": "a whole number",
+    "a valid float range": "a number",
+    "a valid float": "a number",
+}
 COMMANDS = {
-    "run": ("rubhpc.commands.run:run", "Run or resume a study; the word run may be omitted."),
-    "plan": ("rubhpc.commands.run:plan", "Cases, bytes, files, core-hours; done, failed and missing cases."),
-    "compile": ("rubhpc.commands.run:compile_kernels", "Compile the kernels of a study, before a large job."),
-    "status": ("rubhpc.commands.run:status", "Progress and failures, also during a run."),
-    "verify": ("rubhpc.commands.run:verify", "Check every stored case against its checksum."),
-    "modes": (
-        "rubhpc.commands.modes:modes",
-        "Natural frequencies, damping ratios and whirl of a rig; Campbell diagram.",
-    ),
-    "whirl": (
-        "rubhpc.commands.whirl:whirl",
-        "Dry whirl and whip that can exist in the bores of a rig, from receptances.",
-    ),
-    "knock": (
-        "rubhpc.commands.knock:knock",
-        "The least knock that leads to sustained rub, over the speed.",
-    ),
-    "reduce": ("rubhpc.commands.reduce:reduce", "Mean, envelope, quantiles or histogram over many cases."),
-    "report": ("rubhpc.commands.report:report", "One HTML page: maps, and every case behind them."),
-    "view": ("rubhpc.commands.report:view", "The same for a large store, served to this machine only."),
-    "export": ("rubhpc.commands.export:export", "Cases as one file: HDF5, CSV or Parquet."),
-    "dataset": ("rubhpc.commands.dataset:dataset", "Labelled windows through sensors, for machine learning."),
-    "identify": (
-        "rubhpc.commands.identify:identify",
-        "The rub behind a measured vibration, as a posterior.",
-    ),
-    "calibrate": (
-        "rubhpc.commands.calibrate:calibrate",
-        "Whether identification is right as often as it says.",
-    ),
-    "claims": ("rubhpc.commands.claims:claims", "The paper's claims against the stores of jobs/paper."),
+    "run": ("run:run", "Run or resume a study; the word run may be omitted."),
+    "plan": ("run:plan", "Cases, bytes, files, core-hours; done, failed and missing cases."),
+    "compile": ("run:compile_kernels", "Compile the kernels of a study, before a large job."),
+    "status": ("run:status", "Progress and failures, also during a run."),
+    "verify": ("run:verify", "Check every stored case against its checksum."),
+    "modes": ("modes:modes", "Natural frequencies, damping ratios and whirl of a rig; Campbell diagram."),
+    "whirl": ("whirl:whirl", "Dry whirl and whip that can exist in the bores of a rig, from receptances."),
+    "knock": ("knock:knock", "The least knock that leads to sustained rub, over the speed."),
+    "reduce": ("reduce:reduce", "Mean, envelope, quantiles or histogram over many cases."),
+    "report": ("report:report", "One HTML page: maps, and every case behind them."),
+    "view": ("report:view", "The same for a large store, served to this machine only."),
+    "export": ("export:export", "Cases as one file: HDF5, CSV or Parquet."),
+    "dataset": ("dataset:dataset", "Labelled windows through sensors, for machine learning."),
+    "identify": ("identify:identify", "The rub behind a measured vibration, as a posterior."),
+    "calibrate": ("calibrate:calibrate", "Whether identification is right as often as it says."),
+    "claims": ("claims:claims", "The paper's claims against the stores of jobs/paper."),
 }
 
 
@@ -74,7 +67,7 @@ class _Commands(click.Group):
         if cmd_name not in COMMANDS:
             return None
         module, _, name = COMMANDS[cmd_name][0].partition(":")
-        command: click.Command = getattr(import_module(module), name)
+        command: click.Command = getattr(import_module(f"rubhpc.commands.{module}"), name)
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -183,6 +176,8 @@ def _report(text: str, code: int) -> int:
 
 def _one_line(error: click.ClickException) -> str:
     text = error.format_message()
+    for words, plain in _PLAIN.items():
+        text = text.replace(words, plain)
     if isinstance(error, click.UsageError) and error.ctx is not None:
         text = f"{text.rstrip('.')}; see {error.ctx.command_path} --help"
     return text

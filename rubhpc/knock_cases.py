@@ -6,9 +6,9 @@ import glob
 import hashlib
 import json
 import math
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from rubhpc.fem.response import check_response_node, first_lateral_frequency
 from rubhpc.integrate.case import compile_kernels, run_case
 from rubhpc.integrate.setup import prepare
 from rubhpc.knock_search import Direction, find_least
-from rubhpc.schema import DONE, REGIME
+from rubhpc.schema import DONE, REGIME, described
 from rubhpc.study.cases import CaseGrid
 from rubhpc.study.initial import CONTACT_FREE, Initial
 
@@ -37,16 +37,22 @@ if TYPE_CHECKING:
 _LOW, _HIGH = 0.02, 10.0  # first and last impulse tried, over mass x first frequency x clearance
 
 
+def _value(default: float, unit: str, about: str) -> Any:
+    return field(default=default, metadata={"unit": unit, "about": about})
+
+
 @dataclass(frozen=True, kw_only=True)
 class LeastKnock:
     """What is found of one case, SI units; NaN and node 0 (the output node) where no knock leads to rub."""
 
-    least_impulse: float = math.nan
-    harmless_impulse: float = math.nan
-    worst_angle: float = math.nan
-    worst_node: int = 0
-    knocks: int = 0
-    has_contact_free_motion: bool = False
+    least_impulse: float = _value(math.nan, "N s", "least impulse that leads to rub")
+    harmless_impulse: float = _value(math.nan, "N s", "largest impulse below it that did not")
+    worst_angle: float = _value(
+        math.nan, "rad", "direction of the least impulse, from straight up in the sense of positive spin"
+    )
+    worst_node: int = _value(0, "1", "node of the least impulse (0: the output node)")
+    knocks: int = _value(0, "1", "knocks computed")
+    has_contact_free_motion: bool = _value(False, "1", "whether the machine can run free of contact")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,14 +157,8 @@ class Progress:
 def search_of(
     study: Study, *, angles: int, nodes: Sequence[int], most: float | None, tolerance: float
 ) -> Search:
-    """Return the search of a study's cases; see `rubhpc.least_knock`.
-
-    Raises
-    ------
-    InputError
-        As there.
-    """
-    if starts := [axis.name for axis in study.axes if axis.is_initial_key]:
+    """Return the search of a study's cases; see `rubhpc.least_knock`."""
+    if starts := [axis.name for axis in study.axes if axis.table == "initial"]:
         raise InputError(f"[grid] {starts[0]}: the knock itself is searched for; remove this axis")
     tables = {"branch": study.branch, "run_up": study.run_up, "drive": study.drive}
     for table, found in tables.items():
@@ -174,51 +174,42 @@ def dataset_of(search: Search, found: Mapping[str, LeastKnock]) -> xr.Dataset:
     import xarray as xr
 
     study, grid = search.study, search.grid
-    keys = [search.key(index) for index in np.ndindex(grid.shape)]
-    columns = {
-        name: np.array([getattr(found[key], name) for key in keys]).reshape(grid.shape)
-        for name in LeastKnock.__annotations__
+    results = [found[search.key(index)] for index in np.ndindex(grid.shape)]
+    variables = {
+        field.name: (
+            grid.dims,
+            np.array([getattr(one, field.name) for one in results]).reshape(grid.shape),
+            described(field.metadata["unit"], field.metadata["about"]),
+        )
+        for field in fields(LeastKnock)
     }
-    about = {
-        "least_impulse": ("N s", "least impulse that leads to rub"),
-        "harmless_impulse": ("N s", "largest impulse below it that did not"),
-        "worst_angle": (
-            "rad",
-            "direction of the least impulse, from straight up in the sense of positive spin",
-        ),
-        "worst_node": ("1", "node of the least impulse (0: the output node)"),
-        "knocks": ("1", "knocks computed"),
-        "has_contact_free_motion": ("1", "whether the machine can run free of contact"),
+    coords = {
+        axis.coordinate: (axis.dimension, np.array(axis.values), described(axis.unit or "1", axis.long_name))
+        for axis in study.axes
     }
-    return xr.Dataset(
-        {
-            name: (grid.dims, values, {"units": about[name][0], "long_name": about[name][1]})
-            for name, values in columns.items()
-        },
-        coords={
-            axis.coordinate: (
-                axis.dimension,
-                np.array(axis.values),
-                {"units": axis.unit or "1", "long_name": axis.long_name},
-            )
-            for axis in study.axes
-        },
-        attrs={"title": study.title},
-    )
+    return xr.Dataset(variables, coords, attrs={"title": study.title})
 
 
 def impulse_scale(model: Model, reach: float) -> float:
     """Return mass x first lateral frequency x reach (m), N s: a knock that moves the rotor about that far."""
-    is_vertical = np.array([name == "v" for _, name in model.rotor.degrees])
-    mass = float(model.rotor.mass[np.ix_(is_vertical, is_vertical)].sum())
-    return mass * first_lateral_frequency(model) * reach
+    return model.rotor.total_mass * first_lateral_frequency(model) * reach
+
+
+def knocked(impulse: float, direction: Direction) -> Initial:
+    """Return a start in the contact-free motion with an impulse, N s."""
+    angle, node = direction if impulse else (0.0, None)
+    return Initial(from_=CONTACT_FREE, impulse=impulse, impulse_angle=angle, impulse_node=node)
 
 
 class _Knocks:
     """Knocks on one case; as a function of impulse and direction, whether one leads to rub."""
 
     def __init__(self, study: Study, case: Case, nodes: Sequence[int]) -> None:
-        self._study, self._case = study, case
+        self._case: Any = {
+            "clearance": case.clearance,
+            "friction": case.friction,
+            "recording": replace(study.recording, keep=()),
+        }
         model = assemble(case.rig)
         for node in nodes:
             check_response_node(model, node, "node")
@@ -234,12 +225,7 @@ class _Knocks:
 
     def compile(self) -> None:
         """Compile what a knock calls."""
-        compile_kernels(
-            self._setup,
-            clearance=self._case.clearance,
-            friction=self._case.friction,
-            recording=replace(self._study.recording, keep=()),
-        )
+        compile_kernels(self._setup, **self._case)
 
     def has_contact_free_motion(self) -> bool:
         """Whether the case stays free of contact without a knock."""
@@ -247,17 +233,5 @@ class _Knocks:
 
     def __call__(self, impulse: float, direction: Direction) -> bool:
         """Whether a knock leads to rub: contact in the recorded revolutions."""
-        initial = Initial(
-            from_=CONTACT_FREE,
-            impulse=impulse,
-            impulse_angle=direction.angle,
-            impulse_node=direction.node,
-        )
-        record = run_case(
-            self._setup,
-            clearance=self._case.clearance,
-            friction=self._case.friction,
-            recording=replace(self._study.recording, keep=()),
-            initial=initial,
-        )
+        record = run_case(self._setup, **self._case, initial=knocked(impulse, direction))
         return record.status != DONE or record.measures["regime"] != REGIME.index("no_contact")

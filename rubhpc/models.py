@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+# Laws of friction and of the normal force; their places are the numbers in `kernels.laws`.
+FRICTION_LAWS = ("sliding", "coulomb", "stribeck", "table")
+NORMAL_LAWS = ("lagrange", "penalty", "hertz")
 # Geometry of a beam stator, which is that of the gap where it bends.
 LINEAR, SECOND_ORDER = "linear", "second_order"
 # What a study has that gives none of these keys, nor a model.
@@ -31,6 +34,11 @@ def default_of(key: str) -> str:
 def chosen(key: str, model: str | None) -> str:
     """Return what normal, friction_law or geometry is under a model, or without one by default."""
     return default_of(key) if model is None else MODELS[model][key]
+
+
+def may_reverse(friction_law: str | None) -> bool:
+    """Return whether slip may reverse under the friction law of a store, which may lack the key."""
+    return (friction_law or ABSENT["friction_law"]) != "sliding"
 
 
 def in_words(normals: Iterable[str], friction_laws: Iterable[str], geometries: Iterable[str]) -> str:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rubhpc.case_arguments import CaseArguments, case_of, check_count, read_keep, read_probes
+from rubhpc.case_arguments import CaseArguments, case_of, check_count, read_probes, recording_of
 from rubhpc.integrate.periodic_motion import find_periodic_motion
-from rubhpc.study.study import Recording
 from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
@@ -96,10 +95,11 @@ def periodic(
         friction=one.friction,
         period=period,
         repeat=repeat,
-        recording=Recording(
+        recording=recording_of(
+            "periodic",
             transient=transient,
             samples_per_revolution=samples_per_revolution,
-            keep=read_keep("periodic", keep),
+            keep=keep,
             probe=measured,
         ),
         initial=one.initial,

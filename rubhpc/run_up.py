@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.case_arguments import CaseArguments, case_of, read_probes
+from rubhpc.case_arguments import CaseArguments, case_of, read_probes, recording_of
 from rubhpc.errors import InputError, located
 from rubhpc.fem.assemble import assemble
 from rubhpc.fem.free_spin import release
@@ -37,7 +37,6 @@ from rubhpc.study.drive_law import DriveLaw
 from rubhpc.study.initial import CONTACT_FREE
 from rubhpc.study.run_up_keys import check_forces
 from rubhpc.study.speed_law import SpeedLaw
-from rubhpc.study.tables import Recording
 from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
@@ -119,16 +118,24 @@ def run_up(
     >>> round(float(passage.speed[passage.amplitude_vertical.sel(order=1).argmax()]) * 9.5493)
     2037
     """
+    import xarray as xr
+
     given = start, stop, time, speed_law
     if drive is not None and any(value is not None for value in given):
         raise InputError("run_up: drive: takes the place of start, stop, time and speed_law; leave them out")
-    law = _read_law(*given) if drive is None else _read_drive(drive)
+    law: SpeedLaw | DriveLaw
+    if drive is None:
+        law = _read_law(*given)
+    else:
+        keys = build(DriveKeys, drive, "run_up", "drive")
+        with located("run_up: drive: "):
+            law = keys.law_at({})
     for name in ("speed", "speed_ratio", "clearance_ratio"):
         if case.get(name) is not None:
             fix = "give clearance" if name == "clearance_ratio" else "give start, stop and time"
             raise InputError(f"run_up: {name}: the speed changes; {fix}")
     measured = read_probes("run_up", probes)
-    Recording(samples_per_revolution=samples_per_revolution)  # refused as in a study
+    recording_of("run_up", samples_per_revolution=samples_per_revolution)  # refused as in a study
     case["speed"] = _highest(law, rig, case.get("overrides"))
     one = case_of(
         "run_up",
@@ -155,19 +162,13 @@ def run_up(
     )
     signals = by_name(found.whole, one.setup.model)
     known = VARIABLES | bore_variables() | probe_variables((probe.name, probe.quantity) for probe in measured)
-    variables: dict[str, Any] = {
-        name: (known[name].dims, values, described(known[name].unit, known[name].long_name))
-        for name, values in signals.items()
-    }
-    variables["minimum_slip_speed"] = (
-        ("stator",),
-        np.where(np.isfinite(slip := found.together.least_slip), slip, np.nan),
-        described("m s-1", VARIABLES["minimum_slip_speed"].long_name),
-    )
+    variables: dict[str, Any] = {name: known[name].of(values) for name, values in signals.items()}
+    slip = np.where(np.isfinite(slip := found.together.least_slip), slip, np.nan)
+    variables["minimum_slip_speed"] = VARIABLES["minimum_slip_speed"].of(slip)
     own = drive_variables() | run_up_variables((probe.name, probe.quantity) for probe in measured)
     for name, values in by_revolution(found, signals, samples_per_revolution).items():
         short = name if name.startswith((AMPLITUDE, PHASE)) else name.removeprefix("revolution_")
-        variables[short] = own[name].dims, values, described(own[name].unit, own[name].long_name)
+        variables[short] = own[name].of(values)
     attributes: dict[str, Any] = {
         "reason": found.reason,
         "note": "; ".join(text for text in (one.note, found.advice) if text),
@@ -181,18 +182,19 @@ def run_up(
             "energy_residual": found.energy_residual,
         }
     settings = {
-        "clearance": ((), one.clearance, described("m", VARIABLES["clearance"].long_name)),
+        "clearance": VARIABLES["clearance"].of(one.clearance),
         "friction": ((), one.friction, described("1", "friction coefficient")),
     }
-    passage = _dataset(variables, len(found.speed), samples_per_revolution, attributes)
-    return passage.assign_coords(settings)
-
-
-def _read_drive(drive: Mapping[str, object]) -> DriveLaw:
-    """The drive from the keys of its table."""
-    keys = build(DriveKeys, drive, "run_up", "drive")
-    with located("run_up: drive: "):
-        return keys.law_at({})
+    turns = np.arange(n_turn := len(found.speed))
+    samples = np.arange(n_turn * samples_per_revolution) / samples_per_revolution
+    stators = np.arange(1, len(one.rig.stator) + 1)
+    coords = {
+        TURNED: ("sample", samples, described("1", "revolutions turned")),
+        "revolution": ("revolution", turns, described("1", "number of the revolution, from 0")),
+        "order": ("order", np.array(ORDERS), described("1", "order of the spin frequency")),
+        "stator": ("stator", stators, described("1", "number of the stator")),
+    }
+    return xr.Dataset(variables, coords | settings, attributes)
 
 
 def _highest(law: SpeedLaw | DriveLaw, rig: Rig | str | PathLike[str], overrides: Any) -> float:
@@ -226,30 +228,3 @@ def _read_law(
         raise InputError("run_up: speed_law: is not a list of pairs; write [(0, 30), (10, 300)]") from None
     except InputError as error:
         raise InputError(f"run_up: {error}") from None
-
-
-def _dataset(
-    variables: dict[str, Any], n_turn: int, per_revolution: int, attributes: dict[str, Any]
-) -> xr.Dataset:
-    import xarray as xr
-
-    n_stator = variables["contact_force"][1].shape[0]
-    found = xr.Dataset(
-        variables,
-        coords={
-            TURNED: (
-                "sample",
-                np.arange(n_turn * per_revolution) / per_revolution,
-                described("1", "revolutions turned"),
-            ),
-            "revolution": (
-                "revolution",
-                np.arange(n_turn),
-                described("1", "number of the revolution, from 0"),
-            ),
-            "order": ("order", np.array(ORDERS), described("1", "order of the spin frequency")),
-            "stator": ("stator", np.arange(1, n_stator + 1), described("1", "number of the stator")),
-        },
-    )
-    found.attrs |= attributes
-    return found

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,6 +27,10 @@ class Variable:
     long_name: str
     flags: tuple[str, ...] = field(default=())  # meanings of 0, 1, 2, ...
     worst: Literal["max", "min"] = "max"  # the extreme over stators that is the worst of a case
+
+    def of(self, values: Any) -> tuple[tuple[str, ...], Any, dict[str, str]]:
+        """Return a variable of a dataset with these values, along `dims`."""
+        return self.dims, values, described(self.unit, self.long_name)
 
     @property
     def fill_value(self) -> float | int:
@@ -42,6 +47,11 @@ REGIME = ("no_contact", "periodic", "quasi_periodic", "chaotic", "undecided")
 BRANCH_EVENT = ("none", "fold", "period_doubling", "neimark_sacker", "grazing", "end", "branch_point")
 SETTLED = ("not_settled", "settled")
 SCHEMES = ("event_driven", "contact_stepping", "central_difference", "curved", "collocation")
+
+
+def _variable(role: str, name: str, unit: str, long_name: str, *dims: str, **further: Any) -> Variable:
+    return Variable(name=name, role=role, dims=dims, unit=unit, long_name=long_name, **further)
+
 
 # The recorded signals: name, extra dimensions, unit, long name; in single precision, as are their spectra.
 _SIGNALS = (
@@ -61,7 +71,7 @@ def _of_signals(
     prefix: str, role: str, dim: str, text: str, dtype: str = "float32", names: tuple[str, ...] = SIGNAL_NAMES
 ) -> tuple[Variable, ...]:
     return tuple(
-        Variable(name=prefix + n, role=role, dims=(*d, dim), dtype=dtype, unit=u, long_name=text.format(t))
+        _variable(role, prefix + n, u, text.format(t), *d, dim, dtype=dtype)
         for n, d, u, t in _SIGNALS
         if n in names
     )
@@ -72,7 +82,7 @@ _SPECTRA = _of_signals("spectrum_", "spectrum", "order", "amplitude (zero to pea
 _SECTIONS = _of_signals("section_", "section", "section", "{}, once a revolution", "float64", SECTION_NAMES)
 
 CONTACT_ANGLE = "contact_angle"
-# Of records with a bore among the stators, besides the signals.
+# Of records with a bore among the stators, besides the signals: means over the sample's interval.
 _OF_BORES = (
     (CONTACT_ANGLE, "rad", "angle of the contact point from straight up (NaN: no contact)"),
     ("contact_force_vertical", "N", "vertical contact force on the rotor, with friction"),
@@ -81,31 +91,24 @@ _OF_BORES = (
 RUB_KIND = ("none", "partial", "forward", "backward_slipping", "rolling")
 
 FINAL_STATE = "final_state"
-_STATE = Variable(
-    name=FINAL_STATE,
-    role="state",
-    dims=("degree",),
-    long_name="where the case ended: displacements of rotor and stators, their velocities, "
-    "contact forces, overlaps (SI)",
+_STATE = _variable(
+    "state",
+    FINAL_STATE,
+    "1",
+    "where the case ended: displacements of rotor and stators, their velocities, contact forces, "
+    "overlaps (SI)",
+    "degree",
 )
-
-
-def _measure(name: str, unit: str, long_name: str, *dims: str, **further: Any) -> Variable:
-    return Variable(name=name, role="measure", dims=dims, unit=unit, long_name=long_name, **further)
-
-
-_SETTINGS = tuple(
-    Variable(name=n, role="setting", unit=u, long_name=t)
-    for n, u, t in (
-        ("spin_speed", "rad s-1", "spin speed"),
-        ("clearance", "m", "radial clearance at rest"),
-        ("contact_free_amplitude", "m", "steady amplitude without contact"),
-    )
+_SETTINGS = (
+    _variable("setting", "spin_speed", "rad s-1", "spin speed"),
+    _variable("setting", "clearance", "m", "radial clearance at rest"),
+    _variable("setting", "contact_free_amplitude", "m", "steady amplitude without contact"),
 )
 _FLAGS = (
-    Variable(name="status", role="flag", dtype="int8", long_name="state of the case", flags=STATUS),
-    Variable(name="regime", role="flag", dtype="int8", long_name="regime of the motion", flags=REGIME),
+    _variable("flag", "status", "1", "state of the case", dtype="int8", flags=STATUS),
+    _variable("flag", "regime", "1", "regime of the motion", dtype="int8", flags=REGIME),
 )
+_measure = partial(_variable, "measure")
 _RUBS = (
     _measure("rub_kind", "1", "kind of rub in a bore", "stator", dtype="int8", flags=RUB_KIND),
     _measure("whirl_frequency", "rad s-1", "whirl of the contact in a bore, positive forward", "stator"),
@@ -180,10 +183,7 @@ VARIABLES: dict[str, Variable] = {
 
 def bore_variables() -> dict[str, Variable]:
     """Return the waveforms of records with a bore: mean over the sample's interval, by the contact force."""
-    return {
-        n: Variable(name=n, role="waveform", dims=("stator", "sample"), dtype="float32", unit=u, long_name=t)
-        for n, u, t in _OF_BORES
-    }
+    return {row[0]: _variable("waveform", *row, "stator", "sample", dtype="float32") for row in _OF_BORES}
 
 
 # What a probe measures: unit, long name.
@@ -212,18 +212,13 @@ _OF_PROBES: dict[str, tuple[str, tuple[str, ...], str, str]] = {  # prefix: role
 
 def probe_variables(probes: Iterable[tuple[str, str]]) -> dict[str, Variable]:
     """Return the variables of probes, each a name and a quantity: waveforms, spectra, then measures."""
-    known = list(probes)
+    known = [(name, PROBE_QUANTITIES[quantity]) for name, quantity in probes]
     return {
-        f"{prefix}{name}": Variable(
-            name=f"{prefix}{name}",
-            role=role,
-            dims=dims,
-            dtype=dtype,
-            unit=PROBE_QUANTITIES[quantity][0],
-            long_name=text.format(quantity=PROBE_QUANTITIES[quantity][1], name=name),
+        f"{prefix}{name}": _variable(
+            role, f"{prefix}{name}", unit, text.format(quantity=what, name=name), *dims, dtype=dtype
         )
         for prefix, (role, dims, dtype, text) in _OF_PROBES.items()
-        for name, quantity in known
+        for name, (unit, what) in known
     }
 
 
@@ -241,14 +236,14 @@ def lyapunov_variables(n_exponent: int) -> dict[str, Variable]:
 
 POINT, BRANCH = "point_", "branch"  # prefix of the variables of a branch study, and their role
 MULTIPLIERS = 8  # stored of every point
-# Name, dimensions after the point, unit, long name.
-_OF_POINTS: tuple[tuple[str, tuple[str, ...], str, str], ...] = (
-    ("value", (), "1", "value on the axis that is followed (its unit)"),
-    ("branch", (), "1", "number of the branch, from 1"),
-    ("stability", (), "1", "0: unstable, 1: stable"),
-    ("event", (), "1", f"what happens there: 0, 1, ... of {', '.join(BRANCH_EVENT)}"),
-    ("multiplier_real", ("multiplier",), "1", "real part of a Floquet multiplier, largest first"),
-    ("multiplier_imag", ("multiplier",), "1", "imaginary part of a Floquet multiplier"),
+# Name, long name, dimensions after the point.
+_OF_POINTS: tuple[tuple[str, ...], ...] = (
+    ("value", "value on the axis that is followed (its unit)"),
+    ("branch", "number of the branch, from 1"),
+    ("stability", "0: unstable, 1: stable"),
+    ("event", f"what happens there: 0, 1, ... of {', '.join(BRANCH_EVENT)}"),
+    ("multiplier_real", "real part of a Floquet multiplier, largest first", "multiplier"),
+    ("multiplier_imag", "imaginary part of a Floquet multiplier", "multiplier"),
 )
 # Measures of a simulation that a solved motion does not have.
 _OF_RUNS = {
@@ -259,10 +254,7 @@ _OF_RUNS = {
 
 def branch_variables() -> dict[str, Variable]:
     """Return the variables of the points of a branch study; all are floats, NaN beyond the last point."""
-    own = (
-        Variable(name=POINT + name, role=BRANCH, dims=("point", *dims), unit=unit, long_name=text)
-        for name, dims, unit, text in _OF_POINTS
-    )
+    own = (_variable(BRANCH, POINT + name, "1", text, "point", *dims) for name, text, *dims in _OF_POINTS)
     measures = (
         replace(v, name=POINT + v.name, role=BRANCH, dims=("point", *v.dims), dtype="float64", flags=())
         for v in case_measures()
@@ -278,12 +270,12 @@ RUN_UP = "run_up"  # role of what a run-up stores of every revolution
 TURNED = "turned"  # revolutions at a sample of a run-up, whose revolutions are a dimension
 ORDERS = (1 / 3, 1 / 2, 1.0, 2.0)  # of the spin, whose amplitudes and phases are followed
 TRACKED = ("vertical", "horizontal", "torsion")  # signals of which they are, besides the probes
-_OF_REVOLUTIONS = (
-    ("revolution_speed", (), "rad s-1", "mean spin speed of the revolution"),
-    ("revolution_time", (), "s", "beginning of the revolution"),
-    ("revolution_contact_fraction", ("stator",), "1", "fraction of the revolution in contact"),
-    ("revolution_peak_contact_force", ("stator",), "N", "peak contact force in the revolution"),
-    ("revolution_friction_work", ("stator",), "J", "work of friction in the revolution"),
+_OF_REVOLUTIONS: tuple[tuple[str, ...], ...] = (  # name, unit, long name, dimensions after the revolution
+    ("revolution_speed", "rad s-1", "mean spin speed of the revolution"),
+    ("revolution_time", "s", "beginning of the revolution"),
+    ("revolution_contact_fraction", "1", "fraction of the revolution in contact", "stator"),
+    ("revolution_peak_contact_force", "N", "peak contact force in the revolution", "stator"),
+    ("revolution_friction_work", "J", "work of friction in the revolution", "stator"),
 )
 AMPLITUDE, PHASE = "amplitude_", "phase_"
 _OF_DRIVES = (
@@ -295,25 +287,24 @@ RECORD_END = ("all_revolutions", "lowest_speed", "highest_speed")  # why the rec
 
 def run_up_variables(probes: Iterable[tuple[str, str]] = ()) -> dict[str, Variable]:
     """Return the variables of the revolutions of a run-up, NaN beyond the last one of a case."""
-    own = [
-        Variable(name=name, role=RUN_UP, dims=("revolution", *dims), unit=unit, long_name=text)
-        for name, dims, unit, text in _OF_REVOLUTIONS
-    ]
+    own = _of_revolutions(_OF_REVOLUTIONS)
     known = VARIABLES | probe_variables(probes)
     for name in (*TRACKED, *(name for name in known if name.startswith(PROBE))):
-        dims, text = ("revolution", "order"), known[name].long_name
         for prefix, unit, what in ((AMPLITUDE, known[name].unit, "amplitude"), (PHASE, "rad", "phase")):
-            long_name = f"{what} of the {text}"
-            own.append(Variable(name=prefix + name, role=RUN_UP, dims=dims, unit=unit, long_name=long_name))
-    return {v.name: v for v in own}
+            text = f"{what} of the {known[name].long_name}"
+            own[prefix + name] = _variable(RUN_UP, prefix + name, unit, text, "revolution", "order")
+    return own
+
+
+def _of_revolutions(rows: tuple[tuple[str, ...], ...]) -> dict[str, Variable]:
+    return {
+        name: _variable(RUN_UP, name, unit, text, "revolution", *dims) for name, unit, text, *dims in rows
+    }
 
 
 def drive_variables() -> dict[str, Variable]:
     """Return what a driven rotor stores of every revolution besides `run_up_variables`."""
-    return {
-        name: Variable(name=name, role=RUN_UP, dims=("revolution",), unit=unit, long_name=text)
-        for name, unit, text in _OF_DRIVES
-    }
+    return _of_revolutions(_OF_DRIVES)
 
 
 def drive_measures() -> tuple[Variable, ...]:
@@ -342,6 +333,11 @@ def role_of(name: str) -> str:
 def described(unit: str, long_name: str = "") -> dict[str, str]:
     """Return what a dataset says of a variable."""
     return {"units": unit} | ({"long_name": long_name} if long_name else {})
+
+
+def columns(dims: str | tuple[str, ...], about: Mapping[str, tuple[Any, ...]]) -> dict[str, Any]:
+    """Return variables of a dataset along the same dimensions, from values, unit and long name of each."""
+    return {name: (dims, values, described(*words)) for name, (values, *words) in about.items()}
 
 
 def is_signal(name: str) -> bool:

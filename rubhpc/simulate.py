@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from rubhpc.case_arguments import FRICTION, case_of, pick, read_keep, read_probes
+from rubhpc.case_arguments import FRICTION, case_of, pick, read_probes, recording_of
 from rubhpc.integrate.case import run_case
-from rubhpc.study.study import Recording
 from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
@@ -156,13 +155,14 @@ def simulate(
         initial=initial,
         probes=measured,
     )
-    recording = Recording(
+    recording = recording_of(
+        "simulate",
         transient=transient,
         transient_limit=transient_limit,
         transient_tolerance=transient_tolerance,
         revolutions=revolutions,
         samples_per_revolution=samples_per_revolution,
-        keep=read_keep("simulate", keep),
+        keep=keep,
         lyapunov=lyapunov,
         probe=measured,
     )

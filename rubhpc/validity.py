@@ -9,9 +9,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-STEADY_SLIP = (
-    "minimum_slip_speed"  # its monitor holds for steady sliding: under Coulomb's law slip may reverse
-)
+STEADY_SLIP = "minimum_slip_speed"  # its monitor holds for steady sliding: under other laws slip may reverse
 
 
 @dataclass(frozen=True)

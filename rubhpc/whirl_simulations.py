@@ -12,12 +12,11 @@ from rubhpc.fem.assemble import assemble
 from rubhpc.integrate.case import run_case
 from rubhpc.integrate.record import State
 from rubhpc.integrate.setup import prepare
-from rubhpc.knock_cases import impulse_scale
+from rubhpc.knock_cases import impulse_scale, knocked
 from rubhpc.knock_search import Direction, find_least
 from rubhpc.rig.normal_law import NormalLaw
-from rubhpc.schema import DONE, RUB_KIND
+from rubhpc.schema import DONE, RUB_KIND, described
 from rubhpc.study.contact_keys import Contact
-from rubhpc.study.initial import CONTACT_FREE, Initial
 from rubhpc.study.tables import Integrator, Recording
 from rubhpc.threads import on_one_thread
 
@@ -32,6 +31,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.record import Record
     from rubhpc.integrate.setup import Setup
     from rubhpc.rig.rig import Rig
+    from rubhpc.study.initial import Initial
 
     Floats = NDArray[np.float64]
 
@@ -101,18 +101,12 @@ def certify_whirl(
             record = _from_side(setup, whirl, factor)
             kinds[k, j], reached[k, j], is_held[k, j] = _outcome(record, whirl)
         report(n_done := n_done + 1, n_all)
-    found = found.assign(
-        whirl_reached_kind=(("whirl", "side"), kinds),
-        whirl_reached_frequency=(
-            ("whirl", "side"),
-            reached,
-            {"units": "rad s-1", "long_name": "Whirl frequency reached"},
-        ),
-        whirl_is_confirmed=(
-            "whirl",
-            is_held.all(axis=1) == (found["whirl_growth_rate"].values < 0.0),
-        ),
-    ).assign_coords(side=list(SIDES))
+    over, about = ("whirl", "side"), described("rad s-1", "Whirl frequency reached")
+    found = found.assign_coords(side=list(SIDES))
+    found["whirl_reached_kind"] = over, kinds
+    found["whirl_reached_frequency"] = over, reached, about
+    is_stable = found["whirl_growth_rate"].values < 0.0
+    found["whirl_is_confirmed"] = "whirl", is_held.all(axis=1) == is_stable
     knocks = []
     for at, of in groups.items():
         knocks.append(_least_knock(rig, dict(zip(_OF, at, strict=True)), of, contact, angles))
@@ -122,7 +116,7 @@ def certify_whirl(
         found[f"knock_{name}"] = "knock", values.astype(int) if name == "stator" else values, {"units": unit}
     for i, (name, meaning) in enumerate(_IMPULSES.items()):
         values = np.array([knock[i] for knock in knocks])
-        found[f"knock_{name}"] = "knock", values, {"units": "N s", "long_name": meaning}
+        found[f"knock_{name}"] = "knock", values, described("N s", meaning)
     return found
 
 
@@ -282,13 +276,7 @@ def _least_knock(
 
     def whirls_after(impulse: float, direction: Direction) -> bool:
         """Whether contact lasts and whirls in a predicted sense after a knock."""
-        initial = Initial(
-            from_=CONTACT_FREE,
-            impulse=impulse,
-            impulse_angle=direction.angle if impulse else 0.0,
-            impulse_node=direction.node if impulse else None,
-        )
-        record = _run(setup, at, initial, transient, max(8.0, _RECORDED * turns))
+        record = _run(setup, at, knocked(impulse, direction), transient, max(8.0, _RECORDED * turns))
         frequency = record.measures["whirl_frequency"][i]
         if record.status != DONE or math.isnan(frequency):
             return False

@@ -11,12 +11,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import xarray as xr
 
-from postproc.store.axes import axes_of, drawn_axes, source
+from postproc.store.axes import axes_of, drawn_axes, refusal
 from postproc.store.variables import require_variables
-from rubhpc.errors import InputError
 from rubhpc.schema import DONE, INFERRED, REGIME, SECTION_NAMES
 from rubhpc.study.axes import coordinate_of
-from rubhpc.study.initial import PREFIX
 from rubhpc.study.sampling import CASE
 
 if TYPE_CHECKING:
@@ -39,49 +37,35 @@ NO_MOTION = 0  # of a case that is not done, or had not settled
 _SECTIONS = tuple(f"section_{name}" for name in SECTION_NAMES)
 _TORSION = SECTION_NAMES.index("torsion")  # the displacements come before it
 _IF_THERE = ("settled", "largest_multiplier", "multiplier_angle")  # older stores lack some
-_START = coordinate_of(PREFIX)
+_START = coordinate_of("initial.")
 
 
 class _Motions(NamedTuple):
-    """The motions of one setting.
+    """The motions of one setting."""
 
-    Attributes
-    ----------
-    label : (n_case,)
-        1, 2, ... in the order of `key`; `NO_MOTION` where there is none.
-    key : list of (is_contact, period)
-        Of each motion; period 0 where there is none up to 16.
-    feature : list of (n_section, n_feature)
-        What distinguishes motions of one key, SI units.
-    size : (n_section,)
-        Largest coordinate of the section in the setting, of both displacements, and of torsion, SI units.
-    """
-
-    label: Ints
-    key: list[tuple[bool, int]]
-    feature: list[Floats]
-    size: Floats
+    label: Ints  # (n_case,): 1, 2, ... in the order of `key`; `NO_MOTION` where there is none
+    key: list[tuple[bool, int]]  # of each motion: whether it touches, and its period, 0 of none up to 16
+    feature: list[Floats]  # (n_section, n_feature) of each: what distinguishes motions of one key, SI units
+    size: Floats  # (n_section,): largest coordinate in the setting, of displacements and of torsion, SI units
 
 
 def start_axes(store: xr.Dataset) -> list[str]:
     """Return the dimensions along which starts differ: axes `initial_*`, or `case` where starts were drawn.
 
-    Raises
-    ------
-    InputError
-        There are none of several values, or what was drawn is not a start alone.
+    InputError where none has several values, or what was drawn is not a start alone.
     """
     starts = [axis for axis in axes_of(store) if axis.startswith(_START) and store.sizes[axis] > 1]
     if drawn := drawn_axes(store):
         others = [name for name in drawn if not name.startswith(_START)]
         if others:
             problem = f"{others[0]} was drawn along with the starts, so that no two cases share a setting"
-            raise InputError(f"{source(store)}: basins: {problem}; make it an axis of the grid")
+            raise refusal(store, f"basins: {problem}; make it an axis of the grid")
         starts.append(CASE)
     if not starts:
-        raise InputError(
-            f"{source(store)}: basins need starts that differ: an axis of [grid] such as "
-            f'"{PREFIX}vertical" = {{ start = "-1 mm", stop = "1 mm", num = 21 }}'
+        raise refusal(
+            store,
+            "basins need starts that differ: an axis of [grid] such as "
+            '"initial.vertical" = { start = "-1 mm", stop = "1 mm", num = 21 }',
         )
     return starts
 
@@ -113,11 +97,10 @@ def attractors(store: xr.Dataset, tolerance: float = TOLERANCE) -> xr.DataArray:
     to `OF_ONE_SOLUTION` tolerances (mirrored solutions have the same multipliers). A periodic case without a
     solution is of the nearest of these motions whose section is within the tolerance, if any. Motions without
     a period up to 16, on a torus or chaotic, are compared by mean and standard deviation of their section, to
-    `SPREAD_TOLERANCE`, whatever their regime. A torus may pass for a long period, where it repeats to within
-    the tolerance of regimes: cases with a period from `LONG_PERIOD` on, of no solution and with a record that
-    closes no better than `CLOSED`, are compared with those. Two tori of about one place and size count as one
-    motion. Cases are joined by single linkage. The torsion of motions without contact decays and is not
-    compared.
+    `SPREAD_TOLERANCE`: two tori of about one place and size count as one. So are those that may pass for a
+    long period, where a torus repeats to within the tolerance of regimes: from `LONG_PERIOD` on, of no
+    solution and with a record that closes no better than `CLOSED`. Cases are joined by single linkage. The
+    torsion of motions without contact decays and is not compared.
     """
     require_variables(store, ["regime", "period", *_SECTIONS])
     starts = start_axes(store)
@@ -191,8 +174,8 @@ def _motions_of(setting: xr.Dataset, tolerance: float = TOLERANCE) -> _Motions:
 def _features(sections: Floats, period: int, tolerance: float) -> tuple[Floats, float]:
     """What distinguishes motions of one period (n_case, n_feature), and how near counts as one.
 
-    The points of a periodic motion are sorted, coordinate by coordinate: a shift by revolutions, which a
-    start may cause, changes nothing.
+    Points are sorted, coordinate by coordinate: a shift by revolutions, which a start may cause, changes
+    nothing.
     """
     if 0 < period <= sections.shape[2]:
         return np.sort(sections[:, :, -period:], axis=2).reshape(len(sections), -1), tolerance
@@ -209,10 +192,7 @@ def _without_tori(
 ) -> Ints:
     """Return the periods, (n_case,), 0 where a motion in contact may be on a torus that passes for a period.
 
-    Parameters
-    ----------
-    sections : (n_case, n_section, n_point)
-        In units of the sizes of the setting.
+    `sections` are (n_case, n_section, n_point), in units of the sizes of the setting.
     """
     found = period.copy()
     is_solved = np.isfinite(multiplier)

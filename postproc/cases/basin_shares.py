@@ -10,6 +10,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy.special import entr
 
 from postproc.cases.attractors import NO_MOTION
+from postproc.store.units import in_words
 from rubhpc.schema import DONE, REGIME
 
 if TYPE_CHECKING:
@@ -103,7 +104,7 @@ def basin_entropy(attractor: xr.DataArray, x: str, y: str) -> tuple[float, float
 
 def name_of(regime: int, period: int) -> str:
     """Return what a motion is in words: "no contact", "P2", "chaotic"."""
-    text = REGIME[regime].replace("quasi_periodic", "quasi-periodic").replace("_", " ")
+    text = in_words(REGIME[regime])
     return f"P{period}" if text == "periodic" and period > 0 else text
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from postproc.signals.indicators import INDICATORS
-from postproc.store.axes import source
+from postproc.store.axes import refusal
 from rubhpc.errors import InputError
 from rubhpc.schema import DONE, REGIME
 
@@ -97,10 +97,7 @@ def judge(scores: xr.Dataset, false_alarm: float = 0.05, seed: int = 1) -> xr.Da
 def require_both_kinds(store: xr.Dataset, seed: int = 1) -> None:
     """Check that `judge` can learn from a store, by the regime of its cases alone: no waveform is read.
 
-    Raises
-    ------
-    InputError
-        There are too few cases without contact, or with it.
+    InputError where there are too few cases without contact, or with it.
     """
     regime, done = (store[name].values for name in ("regime", "status"))
     _halves(store, regime != REGIME.index("no_contact"), done == DONE, seed)
@@ -116,9 +113,10 @@ def _halves(
     if fewest < _LEAST:
         n_free, n_rub = int((done & ~rub).sum()), int((done & rub).sum())
         which = "smaller clearances" if n_rub < n_free else "clearances above the contact-free amplitude"
-        raise InputError(
-            f"{source(data)}: {n_free} selected cases without contact and {n_rub} with it are too few to "
-            f"learn from; use some {4 * _LEAST} of each, the others by {which} in the study"
+        raise refusal(
+            data,
+            f"{n_free} selected cases without contact and {n_rub} with it are too few to "
+            f"learn from; use some {4 * _LEAST} of each, the others by {which} in the study",
         )
     return halves
 
@@ -128,11 +126,10 @@ def area_under_curve(with_rub: Floats, without: Floats) -> float:
 
     It is the share of pairs in which the case with rub scores higher, ties counted half (Mann and Whitney).
     """
-    from scipy.stats import rankdata
+    from scipy.stats import mannwhitneyu
 
-    n, m = with_rub.size, without.size
-    ranks = rankdata(np.concatenate((with_rub, without)))[:n]
-    return float((ranks.sum() - n * (n + 1) / 2) / (n * m))
+    pairs = mannwhitneyu(with_rub, without, method="asymptotic").statistic
+    return float(pairs) / (with_rub.size * without.size)
 
 
 def _together(values: Floats, learnt: NDArray[np.bool_]) -> Floats:

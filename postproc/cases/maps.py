@@ -8,12 +8,12 @@ import numpy as np
 import xarray as xr
 
 from postproc.store.attributes import table_of
-from postproc.store.axes import axes_of, drawn_axes, find_axis, source
+from postproc.store.axes import axes_of, drawn_axes, find_axis, refusal
 from postproc.store.run_ups import STEADY, is_run_up
 from postproc.store.select import narrow
-from postproc.store.units import meanings
+from postproc.store.units import in_words, meanings
 from postproc.store.variables import require_variables
-from rubhpc.errors import InputError
+from rubhpc.models import may_reverse
 from rubhpc.schema import HAS_VALUES, REGIME, SETTLED, VARIABLES, role_of
 from rubhpc.study.axes import SPEED_AXES, coordinate_of
 from rubhpc.validity import MONITORS, STEADY_SLIP, counted, words
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 _ROLES = ("measure", "flag", "setting")
 MAPPABLE = tuple(n for n, v in VARIABLES.items() if v.role in _ROLES)
-_FRICTION_LAW = "contact_friction_law"  # where it is an axis: under Coulomb's law slip may reverse
+_FRICTION_LAW = "contact_friction_law"  # where it is an axis: under some laws slip may reverse
 MOST_FACETS, MOST_PANELS = 2, 6
 
 
@@ -40,7 +40,7 @@ def default_axes(
     """Return the axes across and up of a map: those named, and else the longest that are no facets."""
     named = [find_axis(store, name) for name in (x, y) if name]
     if len(set(named)) < len(named):
-        raise InputError(f"{source(store)}: --x and --y are both {named[0]}; a map needs two axes")
+        raise refusal(store, f"--x and --y are both {named[0]}; a map needs two axes")
     axes = axes_of(store)
     taken = {*named, *(find_axis(store, name) for name in facets)}
     free = [a for a in axes if store.sizes[a] > 1 and a not in taken]
@@ -49,9 +49,7 @@ def default_axes(
         sizes = ", ".join(f"{a} ({store.sizes[a]})" for a in axes) or "none"
         other = "open rubhpc report" if is_run_up(store) else "draw rubhpc bifurcation or open rubhpc report"
         advice = f"over one axis, {other}"
-        raise InputError(
-            f"{source(store)}: a map needs two axes of several values; there is {sizes}; {advice}"
-        )
+        raise refusal(store, f"a map needs two axes of several values; there is {sizes}; {advice}")
     across = named.pop(0) if x else free.pop(0)
     return across, named.pop(0) if y else free.pop(0)
 
@@ -59,41 +57,36 @@ def default_axes(
 def scatter_axes(store: xr.Dataset, x: str | None = None, y: str | None = None) -> tuple[str, str]:
     """Return the drawn quantities across and up: those named, else a speed and then the first others.
 
-    Raises
-    ------
-    InputError
-        One that is named was not drawn, or both are the same.
+    InputError where one that is named was not drawn, or both are the same.
     """
     drawn = drawn_axes(store)
     named = [coordinate_of(name) if name else None for name in (x, y)]
     for name in named:
         if name is not None and name not in drawn:
             what = "is an axis: name it with --facet" if name in axes_of(store) else "was not drawn"
-            raise InputError(f"{source(store)}: {name}: {what}; the sample has {', '.join(drawn)}")
+            raise refusal(store, f"{name}: {what}; the sample has {', '.join(drawn)}")
     in_order = dict.fromkeys(name for name in (*SPEED_AXES, *drawn) if name in drawn)
     free = [name for name in in_order if name not in named]
     across, up = (name or free.pop(0) for name in named)
     if across == up:
-        raise InputError(f"{source(store)}: {across} is on both axes; name another one")
+        raise refusal(store, f"{across} is on both axes; name another one")
     return across, up
 
 
 def facet_axes(store: xr.Dataset, names: Sequence[str], taken: Sequence[str]) -> list[str]:
     """Return the axes of small multiples, down and across: at most two, of at most six values each.
 
-    Raises
-    ------
-    InputError
-        No such axis, too many of them or of their values, or one that the maps spread over already.
+    InputError where there is no such axis, there are more, or the maps spread over one already.
     """
     facets = [find_axis(store, name) for name in names]
     if len(facets) > MOST_FACETS or len({*facets, *taken}) < len(facets) + len(taken):
-        raise InputError(f"{source(store)}: --facet: give one or two axes other than {' or '.join(taken)}")
+        raise refusal(store, f"--facet: give one or two axes other than {' or '.join(taken)}")
     for axis in facets:
         if store.sizes[axis] > MOST_PANELS:
-            raise InputError(
-                f"{source(store)}: --facet {axis}: {store.sizes[axis]} values are more than {MOST_PANELS}; "
-                f"keep some with --select {axis}=..."
+            raise refusal(
+                store,
+                f"--facet {axis}: {store.sizes[axis]} values are more than {MOST_PANELS}; "
+                f"keep some with --select {axis}=...",
             )
     return facets[::-1]
 
@@ -105,8 +98,6 @@ def map_data(store: xr.Dataset, value: str, spread: Sequence[str], facets: Seque
     ----------
     store : Dataset
         All other axes of more than one value must have been selected.
-    value : str
-        A measure, setting or flag of the store.
     spread : sequence of str
         The axes x and y of a map, or the one along which the cases of a sample lie.
 
@@ -120,10 +111,10 @@ def map_data(store: xr.Dataset, value: str, spread: Sequence[str], facets: Seque
         require_variables(store, [value])
         lacking = STEADY if is_run_up(store) else ()
         known = ", ".join(n for n in map(str, store.data_vars) if is_mappable(n) and n not in lacking)
-        raise InputError(f"{source(store)}: {value}: not a measure of a case; choose {known}")
+        raise refusal(store, f"{value}: not a measure of a case; choose {known}")
     if is_run_up(store):
         if value in STEADY:
-            raise InputError(f"{source(store)}: {value}: is of a steady speed; choose another measure")
+            raise refusal(store, f"{value}: is of a steady speed; choose another measure")
         store = store.drop_vars(STEADY, errors="ignore")
     store = store.assign(validity=validity(store))
     marks = ["status", "validity", *(n for n in ("settled",) if n in store)]  # older stores lack the last
@@ -134,10 +125,10 @@ def map_data(store: xr.Dataset, value: str, spread: Sequence[str], facets: Seque
 
 
 def monitors(store: xr.Dataset) -> dict[str, Monitor]:
-    """Return the monitors that hold for a store: under Coulomb's law slip may reverse."""
+    """Return the monitors that hold for a store: without steady sliding slip may reverse."""
     contact = table_of(store, "study").get("contact", {})
-    has_stick = contact.get("friction_law") == "coulomb"
-    return {n: monitor for n, monitor in MONITORS.items() if not (has_stick and n == STEADY_SLIP)}
+    is_free = may_reverse(contact.get("friction_law"))
+    return {n: monitor for n, monitor in MONITORS.items() if not (is_free and n == STEADY_SLIP)}
 
 
 def validity(store: xr.Dataset) -> xr.DataArray:
@@ -150,7 +141,8 @@ def validity(store: xr.Dataset) -> xr.DataArray:
             # A case is out of range where one of its stators is, whichever is drawn.
             bad = bad.any([d for d in ("stator",) if d in bad.dims])
             if name == STEADY_SLIP and _FRICTION_LAW in store.coords:
-                bad &= store[_FRICTION_LAW] != meanings(store[_FRICTION_LAW]).index("coulomb")
+                laws = meanings(store[_FRICTION_LAW])
+                bad &= store[_FRICTION_LAW].isin([i for i, law in enumerate(laws) if not may_reverse(law)])
             found = found | np.int16(1 << i) * bad.astype(np.int16)
     legend = ", ".join(
         f"{1 << i} ({monitor.name} out of range)"
@@ -186,8 +178,8 @@ def verdict_of(cases: xr.Dataset) -> tuple[str, ...]:
     found = []
     regime, period = (int(case[n]) if n in case else -1 for n in ("regime", "period"))
     if regime >= 0:
-        word = REGIME[regime].replace("quasi_", "quasi-").replace("_", " ")
-        found.append(f"period {period}" if period > 0 and REGIME[regime] == "periodic" else word)
+        is_periodic = period > 0 and REGIME[regime] == "periodic"
+        found.append(f"period {period}" if is_periodic else in_words(REGIME[regime]))
     if "settled" in case and int(case["settled"]) == SETTLED.index("not_settled"):
         found.append("not settled")
     code = int(validity(case))

@@ -10,27 +10,23 @@ from __future__ import annotations
 import math
 import os
 import warnings
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import dask.array as da
 import numpy as np
 import xarray as xr
-import zarr
 
 from postproc.cases.workers import computed as computed
 from postproc.signals.spectra import spectrum_of, with_frequency
-from postproc.store.axes import axes_of, find_axis, source
-from postproc.store.open import open_store
+from postproc.store.axes import axes_of, find_axis, refusal
+from postproc.store.open import open_arrays, open_store
 from postproc.store.select import select, worst_of_stators
 from postproc.store.variables import LONG_ROLES, require_measure
-from rubhpc.errors import InputError
-from rubhpc.input.array_files import CHECKED
 from rubhpc.schema import DONE, HAS_VALUES, role_of
-from rubhpc.storage.regular_files import RegularFiles
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
-    from pathlib import Path
 
 
 _MEMORY = 1e9  # bytes of all pieces together, each counted four times: as stored, as read, in between
@@ -48,15 +44,7 @@ def open_in_pieces(path: str | Path, n_byte: float | None = None) -> xr.Dataset:
     if n_byte is None:
         n_byte = min(max(_MEMORY / (4 * (os.cpu_count() or 1)), _SMALLEST), _LARGEST)
     store = open_store(path)
-    with warnings.catch_warnings(), zarr.config.set(CHECKED):
-        warnings.simplefilter("ignore", RuntimeWarning)  # as in `open_store`
-        bare = xr.open_zarr(
-            RegularFiles(path),
-            chunks=None,
-            zarr_format=3,
-            decode_times=False,
-            decode_timedelta=False,
-        )
+    bare = open_arrays(Path(path), chunks=None)
     pieces: dict[str, xr.DataArray] = {}
     for name in map(str, store.data_vars):
         # Those of branches and run-ups, in another form than stored, are few.
@@ -85,10 +73,8 @@ def reduce_store(
         "mean" or "envelope" of the spectra of a signal, "quantiles" or "histogram" of a measure.
     of : str
         The signal, or the measure.
-    over : iterable of axes
-        Axes to reduce; none: all of them.
-    choice : mapping of axis to value, optional
-        The cases to take, as in `postproc.store.select.select`.
+    over, choice
+        Axes to reduce (none: all), and the cases to take, as in `postproc.store.select.select`.
     levels, bins
         Of `quantiles` and `histogram`.
     """
@@ -181,7 +167,7 @@ def histogram(
     values, axes = _done(store, measure, over)
     known = values.values[np.isfinite(values.values)]
     if not known.size:
-        raise InputError(f"{source(store)}: {measure}: no selected case has a value; select others")
+        raise refusal(store, f"{measure}: no selected case has a value; select others")
     edges = np.histogram_bin_edges(known, bins)
     others = [d for d in values.dims if d not in axes]
     rows = values.transpose(*others, *axes)
@@ -222,7 +208,7 @@ def _axes(store: xr.Dataset, values: xr.DataArray, over: Iterable[str]) -> list[
     """Return the dimensions to reduce; all of the study's axes when none is named."""
     axes = [find_axis(store, name) for name in over] or list(axes_of(store))
     if lost := [a for a in axes if a not in values.dims]:
-        raise InputError(f"{source(store)}: {values.name}: does not depend on {lost[0]}; leave that one out")
+        raise refusal(store, f"{values.name}: does not depend on {lost[0]}; leave that one out")
     return axes
 
 

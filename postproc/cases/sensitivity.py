@@ -15,10 +15,9 @@ import numpy as np
 import xarray as xr
 
 from postproc.cases.sobol import by_point, drawn_ranges, estimate, filled_in, grid_indices, half_widths
-from postproc.store.axes import axes_of, drawn_axes, source
+from postproc.store.axes import axes_of, drawn_axes, refusal
 from postproc.store.select import narrow, worst_of_stators, written_values
 from postproc.store.variables import require_measure
-from rubhpc.errors import InputError
 from rubhpc.schema import DIVERGED, DONE, FAILED, MISSING
 from rubhpc.study.sampling import CASE
 
@@ -106,10 +105,11 @@ def _sampled(store: xr.Dataset, measure: str, n_draw: int, confidence: float, se
     _refuse_gaps(store, measure, usable, notes, "left out")
     n_drop = int((~whole).sum())
     if n_drop > MOST_DROPPED * whole.size:
-        raise InputError(
-            f"{source(store)}: {measure}: {n_drop} of {whole.size} base points of the sample have a case "
+        raise refusal(
+            store,
+            f"{measure}: {n_drop} of {whole.size} base points of the sample have a case "
             f"without a value ({'; '.join(notes)}); at most {MOST_DROPPED:.0%} can be left out: run the "
-            "study to its end"
+            "study to its end",
         )
     if n_drop:
         notes.append(f"{n_drop} of {whole.size} base points left out, since one of their cases has no value")
@@ -127,16 +127,17 @@ def _refuse_gaps(
 ) -> None:
     n_gap = usable.size - int(usable.sum())
     if n_gap > MOST_FILLED * usable.size:
-        raise InputError(
-            f"{source(store)}: {measure}: {n_gap} of {usable.size} cases have no value ({'; '.join(notes)}); "
+        raise refusal(
+            store,
+            f"{measure}: {n_gap} of {usable.size} cases have no value ({'; '.join(notes)}); "
             f"at most {MOST_FILLED:.0%} can be {fate}: run the study to its end, or select axis values with "
-            "fewer of them"
+            "fewer of them",
         )
 
 
 def _need_variance(store: xr.Dataset, measure: str, values: Floats) -> None:
     if not values.std() > _CLOSE * np.abs(values).max():
-        raise InputError(f"{source(store)}: {measure}: the same in all cases; there is no variance to share")
+        raise refusal(store, f"{measure}: the same in all cases; there is no variance to share")
 
 
 def _usable_values(store: xr.Dataset, measure: str, spread: list[str]) -> tuple[xr.DataArray, list[str]]:
@@ -163,9 +164,10 @@ def _levels(store: xr.Dataset, measure: str) -> tuple[xr.DataArray, list[str]]:
             values = values.isel({axis: np.flatnonzero(is_level)})
     values = values.squeeze()
     if not values.ndim or not usable.any():
-        raise InputError(
-            f"{source(store)}: {measure}: no axis has two values with cases that are done; "
-            "run the study to its end, or select others"
+        raise refusal(
+            store,
+            f"{measure}: no axis has two values with cases that are done; "
+            "run the study to its end, or select others",
         )
     return values, notes
 

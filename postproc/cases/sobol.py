@@ -14,9 +14,8 @@ import numpy as np
 import xarray as xr
 
 from postproc.store.attributes import table_of
-from postproc.store.axes import drawn_axes, source
+from postproc.store.axes import drawn_axes, refusal
 from postproc.store.units import displayed
-from rubhpc.errors import InputError
 from rubhpc.study.axes import coordinate_of
 from rubhpc.study.sampling import cases_per_point
 from rubhpc.study.tables import SALTELLI
@@ -32,20 +31,10 @@ _LEAST_SHARE = 1e-6  # by which a share of the variance is off through rounding,
 
 
 def grid_indices(values: Floats, weights: list[Floats] | None = None) -> Floats:
-    """Return first-order and total Sobol indices on a full grid, exactly.
+    """Return first-order and total Sobol indices on a full grid (n_1, ..., n_axis), exactly, (2, n_axis).
 
     `S_i = Var(E[f | x_i]) / Var(f)`, `T_i = E[Var(f | x_j, j != i)] / Var(f)`, with independent axes whose
-    levels weigh `weights`, or all the same.
-
-    Parameters
-    ----------
-    values : (n_1, ..., n_axis)
-    weights : list of (n_i,), optional
-        Each sums to 1.
-
-    Returns
-    -------
-    (2, n_axis)
+    levels weigh `weights`, (n_i,) each with the sum 1, or all the same.
     """
     weights = weights or [np.full(n, 1 / n) for n in values.shape]
     values = values - values.mean()  # or squares of a large mean hide a small variance
@@ -128,22 +117,21 @@ def _level_weights(random: np.random.Generator, n: int) -> Floats:
 def by_point(values: xr.DataArray, store: xr.Dataset) -> Floats:
     """Return a measure over the cases of a sample by base point, (n_point, n_range + 2).
 
-    Raises
-    ------
-    InputError
-        When the sample is not Saltelli's, or some of it has been left out by selection.
+    InputError where the sample is not Saltelli's, or some of it has been left out by selection.
     """
     sample = table_of(store, "study").get("sample", {})
     if (method := sample.get("method", SALTELLI)) != SALTELLI:
-        raise InputError(
-            f'{source(store)}: its sample was drawn with method = "{method}", and Sobol indices need '
-            'Saltelli\'s design; run the study with [sample] method = "sobol" into another output'
+        raise refusal(
+            store,
+            f'its sample was drawn with method = "{method}", and Sobol indices need '
+            'Saltelli\'s design; run the study with [sample] method = "sobol" into another output',
         )
     shape = (int(sample.get("n", 0)), cases_per_point(len(drawn_axes(store))))
     if values.size != math.prod(shape):
-        raise InputError(
-            f"{source(store)}: {values.size} of the {math.prod(shape)} cases of the sample are selected, and "
-            "its indices need all of them; select nothing of what was drawn"
+        raise refusal(
+            store,
+            f"{values.size} of the {math.prod(shape)} cases of the sample are selected, and "
+            "its indices need all of them; select nothing of what was drawn",
         )
     rows: Floats = values.values.reshape(shape)
     return rows
@@ -172,10 +160,7 @@ def drawn_ranges(store: xr.Dataset) -> list[str]:
 def estimate(values: Floats, n_draw: int, confidence: float, seed: int) -> tuple[Floats, Floats]:
     """Return first-order and total indices and half the width of their intervals, (2, n_range) each.
 
-    Parameters
-    ----------
-    values : (n_point, n_range + 2)
-        Of whole base points.
+    `values` are (n_point, n_range + 2), of whole base points.
     """
     from SALib.analyze import sobol
 

@@ -74,10 +74,7 @@ def workers(
 def become_rank_of_cluster() -> None:
     """Make this MPI rank the scheduler (rank 0), or a worker (from rank 2); only rank 1 returns.
 
-    Raises
-    ------
-    InputError
-        There are fewer than three ranks, or dask-mpi is not installed.
+    InputError where there are fewer than three ranks, or dask-mpi is not installed.
     """
     with _packages_of_scale("mpi"):
         from dask_mpi import WorldTooSmallException, initialize

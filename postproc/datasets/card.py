@@ -48,25 +48,13 @@ _VERSION = "1.0.0"  # of the layout of a data set
 
 @dataclass(frozen=True, kw_only=True)
 class Made:
-    """What a data set is made of.
+    """What a data set is made of."""
 
-    Attributes
-    ----------
-    about : dict of text
-        Title, study, rig, versions and identity of the store.
-    columns : list of Column
-    windows : Windows
-    n_left_out : int
-        Cases without a result.
-    files : dict of name to (n_case, n_window, n_contact)
-        Of each split: its cases and windows, and the windows with contact.
-    """
-
-    about: dict[str, str]
+    about: dict[str, str]  # title, study, rig, versions and identity of the store
     columns: list[Column]
     windows: Windows
-    n_left_out: int
-    files: dict[str, tuple[int, int, int]]
+    n_left_out: int  # cases without a result
+    files: dict[str, tuple[int, int, int]]  # of each split: cases, windows, and windows with contact
 
 
 def readme(made: Made) -> str:

@@ -45,24 +45,12 @@ class Column(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class CaseColumns:
-    """What is known of each case, in the order of the grid.
+    """What is known of each case, in the order of the grid."""
 
-    Attributes
-    ----------
-    columns : list of Column
-        Parameters, labels, and which limits of the model a case leaves.
-    values : dict of name to (n_case,)
-        Their values.
-    parameters : dict of name to (n_case,)
-        What was varied: the values on the axes of the study.
-    touches : (n_case,)
-        Whether the case has any contact.
-    """
-
-    columns: list[Column]
-    values: dict[str, NDArray[Any]]
-    parameters: dict[str, NDArray[Any]]
-    touches: NDArray[np.bool_]
+    columns: list[Column]  # parameters, labels, and which limits of the model a case leaves
+    values: dict[str, NDArray[Any]]  # of the columns, (n_case,)
+    parameters: dict[str, NDArray[Any]]  # what was varied, (n_case,)
+    touches: NDArray[np.bool_]  # whether there is any contact, (n_case,)
 
     def of(self, i: int) -> dict[str, Any]:
         """Return the values of a case, None where there is none."""

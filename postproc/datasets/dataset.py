@@ -21,13 +21,13 @@ from postproc.signals.indicators import rms_about_mean
 from postproc.signals.sensors import Sensor, check_rate
 from postproc.signals.spectra import check_signal, samples_per_revolution
 from postproc.store.attributes import MEASURED
-from postproc.store.axes import axes_of, source
+from postproc.store.axes import axes_of, refusal
 from postproc.store.branch_points import is_of_points
 from postproc.store.case_table import import_parquet, metadata_of
 from postproc.store.run_ups import is_run_up
 from postproc.store.variables import require_results, require_variables
 from rubhpc.errors import InputError, writing
-from rubhpc.schema import DONE, PROBE, TURNED
+from rubhpc.schema import DONE, PROBE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -93,7 +93,7 @@ def write_dataset(
     check_shares(shares)
     if is_of_points(store) or MEASURED in store.attrs:
         problem = "has no simulated waveforms, whose contacts are known"
-        raise InputError(f"{source(store)}: {problem}; give the store of a study of cases or run-ups")
+        raise refusal(store, f"{problem}; give the store of a study of cases or run-ups")
     waves = _waves_of(store, signals)
     is_done = store["status"].values.ravel() == DONE
     require_results(np.where(is_done, 0.0, math.nan), store)
@@ -183,26 +183,22 @@ def _waves_of(store: xr.Dataset, signals: Sequence[str]) -> Waves:
 def _rate(store: xr.Dataset, n_sample: int, rate: float | None) -> float:
     """The sampling rate, Hz: as given, or the lowest of those with which the cases are stored.
 
-    Raises
-    ------
-    InputError
-        The shortest record holds no window.
+    InputError where the shortest record holds no window.
     """
+    per_revolution = samples_per_revolution(store)
     if is_run_up(store):
         speeds, begins = (store[name].transpose(..., "revolution").values for name in ("speed", "time"))
-        per_revolution = round(1.0 / float(store[TURNED][1] - store[TURNED][0]))
         turned = np.isfinite(speeds).any(axis=-1)
         shortest = float((np.nanmax(begins[turned], axis=-1) - np.nanmin(begins[turned], axis=-1)).min())
     else:
         speeds = np.abs(store["spin_speed"].values)
-        per_revolution = samples_per_revolution(store["revolution"])
         shortest = store.sizes["sample"] / per_revolution * 2.0 * math.pi / float(speeds.max())
     if rate is None:
         rate = float(f"{per_revolution * float(np.nanmin(speeds)) / (2.0 * math.pi):.3g}")
     check_rate(rate)
     if n_sample > int(shortest * rate):
         problem = f"{n_sample} samples at {rate:g} Hz take longer than the shortest record, {shortest:.3g} s"
-        raise InputError(f"{source(store)}: {problem}; use at most --samples {int(shortest * rate)}")
+        raise refusal(store, f"{problem}; use at most --samples {int(shortest * rate)}")
     return rate
 
 

@@ -22,15 +22,8 @@ _OWN_UNITS = {"band": "Hz", "drop_outs": "", "drop_out_length": ""}  # the other
 def read_sensors(path: str | Path, units: Mapping[str, str]) -> dict[str, Sensor]:
     """Return the sensors of a file; a signal without a table has one without noise.
 
-    Parameters
-    ----------
-    units : mapping
-        Signals that there are, and the unit of each, as in a store.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, a signal or key is unknown, or a value has another unit.
+    `units` are those of the signals that there are, as in a store. InputError where the file cannot be read,
+    a signal or key is unknown, or a value has another unit.
     """
     tables, file = read_toml(Path(path)), str(path)
     refuse_unknown(tables, units, file, "")

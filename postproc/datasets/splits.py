@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rubhpc.errors import InputError
-from rubhpc.study import contact_axes, initial
 from rubhpc.study.axes import CLEARANCE_AXES, DIRECTION, coordinate_of
 
 if TYPE_CHECKING:
@@ -17,9 +16,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 SPLITS = ("train", "validation", "test")
-_OF_START = coordinate_of(initial.PREFIX)
+_OF_START = coordinate_of("initial.")
 _OF_GAP = ("friction", *CLEARANCE_AXES)
-_OF_CONTACT = (coordinate_of(contact_axes.PREFIX), "stator_", "carrier_")
+_OF_CONTACT = (coordinate_of("contact."), "stator_", "carrier_")
 
 
 def check_shares(shares: Sequence[float]) -> None:
@@ -40,14 +39,8 @@ def keys_of(
 
     Both follow from the parameters alone, so that they stay what they are when a store grows. Cases that may
     have the same motion are one group: those that differ only in their start or in the direction of a sweep,
-    and, of cases without contact, those that differ only in what acts in contact.
-
-    Parameters
-    ----------
-    parameters : mapping of name to (n_case,)
-        What was varied.
-    touches : (n_case,)
-        Whether the case has any contact.
+    and, of cases without contact, those that differ only in what acts in contact. `parameters` are what was
+    varied, (n_case,) each, and `touches` says which cases have any contact.
     """
     of_motion = [name for name in parameters if name != DIRECTION and not name.startswith(_OF_START)]
     of_free = [name for name in of_motion if name not in _OF_GAP and not name.startswith(_OF_CONTACT)]
@@ -65,12 +58,8 @@ def split_cases(
 ) -> NDArray[np.intp]:
     """Return the split of each case, (n_case,): 0, 1 or 2.
 
-    Groups with contact and groups without are shared out separately, so that all splits have both.
-
-    Raises
-    ------
-    InputError
-        A split with a share above 0 would have no case.
+    Groups with contact and groups without are shared out separately, so that all splits have both. InputError
+    where a split with a share above 0 would have no case.
     """
     members: dict[int, list[int]] = {}
     for i, group in enumerate(groups):

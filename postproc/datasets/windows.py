@@ -23,49 +23,23 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Windows:
-    """How windows are made of a case.
+    """How windows are made of a case."""
 
-    Attributes
-    ----------
-    sensors : mapping of column to Sensor
-        What each signal is seen by.
-    reference : mapping of column to float
-        White noise at level 1, rms in the unit of the signal; empty where sensors have noise of their own.
-    levels : tuple of float
-        Of the noise; empty where sensors have noise of their own.
-    n_draw : int
-        Windows of a case at each level.
-    n_sample : int
-        Samples of a window.
-    rate : float
-        Of the samples, Hz.
-    seed : int
-        Of places and noise.
-    """
-
-    sensors: Mapping[str, Sensor]
-    reference: Mapping[str, float]
-    levels: tuple[float, ...]
-    n_draw: int
-    n_sample: int
-    rate: float
-    seed: int
+    sensors: Mapping[str, Sensor]  # what the signal of a column is seen by
+    reference: Mapping[str, float]  # white noise at level 1, rms in its unit; none where sensors have noise
+    levels: tuple[float, ...]  # of the noise; none where sensors have noise of their own
+    n_draw: int  # windows of a case at each level
+    n_sample: int  # of a window
+    rate: float  # Hz
+    seed: int  # of places and noise
 
     def of_case(
         self, case: xr.Dataset, waves: Mapping[str, NDArray[np.floating[Any]]], force: NDArray[Any], key: int
     ) -> Iterator[dict[str, Any]]:
-        """Yield the windows of a case as rows, by column.
+        """Yield the windows of a loaded case as rows, by column.
 
-        Parameters
-        ----------
-        case : Dataset
-            Of the store, loaded.
-        waves : mapping of column to (n_sample,)
-            Its signals.
-        force : (n_stator, n_sample), N
-            Contact forces of all stators.
-        key : int
-            Of the case: with the seed it decides places and noise.
+        `waves` are its signals by column, (n_sample,); `force` is that of all stators, (n_stator, n_sample),
+        N; `key`, with the seed, decides places and noise.
         """
         clock = Clock(case, self.rate)
         seen = {name: clock.before_converter(waves[name], sensor) for name, sensor in self.sensors.items()}

@@ -77,12 +77,8 @@ def described(data: xr.Dataset) -> list[str]:
 def draw_motions(data: xr.Dataset, case: xr.Dataset, colors: Mapping[int, str], ax: Axes) -> Axes:
     """Draw the orbit of each motion in its colour, or its section points alone, with clearance and stators.
 
-    Parameters
-    ----------
-    data : Dataset
-        From `postproc.cases.basin_shares.examples`, of one setting.
-    case : Dataset
-        Of that setting: `clearance`, and the rig among its attributes.
+    `data` is that of `postproc.cases.basin_shares.examples`, of one setting, and `case` one of that setting,
+    with its clearance and rig.
     """
     kind = "orbit" if "orbit_vertical" in data else "motion_section"
     vertical, horizontal = data[f"{kind}_vertical"], data[f"{kind}_horizontal"]

@@ -21,11 +21,11 @@ from postproc.figures.basin_motions import (
 from postproc.figures.cells import cell_edges, hatch_cells, is_geometric, tick_levels
 from postproc.figures.drawing import Drawing
 from postproc.figures.palette import NOT_DONE, NOT_SETTLED
+from postproc.figures.scatter import mark_size
 from postproc.figures.small_multiples import legend_below
-from postproc.store.axes import axes_of, drawn_axes, find_axis, source
+from postproc.store.axes import axes_of, drawn_axes, find_axis, refusal
 from postproc.store.select import first_of_rest, worst_of_stators
 from postproc.store.units import displayed, written_value
-from rubhpc.errors import InputError
 from rubhpc.schema import DONE
 from rubhpc.study.sampling import CASE
 
@@ -77,7 +77,7 @@ def basins(
     if along is not None:
         axis = find_axis(cases, along)
         if axis in starts:
-            raise InputError(f"{source(cases)}: --along {along}: is a start; name an axis such as a speed")
+            raise refusal(cases, f"--along {along}: is a start; name an axis such as a speed")
         return _along(cases, axis, starts, tolerance)
     across, up = _plane(cases, starts, x, y)
     spread = [CASE] if drawn_axes(cases) else [across, up]
@@ -133,20 +133,16 @@ def _plane(cases: xr.Dataset, starts: Sequence[str], x: str | None, y: str | Non
     named = [name.replace(".", "_") if name else None for name in (x, y)]
     for name in named:
         if name is not None and name not in known:
-            raise InputError(
-                f"{source(cases)}: basins: no axis {name} of several values; choose {', '.join(known)}"
-            )
+            raise refusal(cases, f"basins: no axis {name} of several values; choose {', '.join(known)}")
     ordered = sorted(known, key=lambda a: (a not in (drawn or starts), -cases[a].size))
     free = [a for a in ordered if a not in named]
     if len(free) + sum(name is not None for name in named) < 2:
-        raise InputError(
-            f"{source(cases)}: basins: a picture needs two axes of several values; there is {known[0]} alone"
-        )
+        raise refusal(cases, f"basins: a picture needs two axes of several values; there is {known[0]} alone")
     if named == [None, None] and not drawn and len(starts) == 1:
         return free[1], free[0]  # a start up, a parameter across
     across, up = (name or free.pop(0) for name in named)
     if across == up:
-        raise InputError(f"{source(cases)}: --x and --y are both {across}; a picture needs two axes")
+        raise refusal(cases, f"--x and --y are both {across}; a picture needs two axes")
     return across, up
 
 
@@ -268,7 +264,7 @@ def _cells(
 def _scatter(data: xr.Dataset, x: Floats, y: Floats, colors: dict[int, str], ax: Axes) -> list[Artist]:
     """Draw a point a start, and return a handle for each motion."""
     found = data["attractor_reached"].values
-    size = float(np.clip(5000.0 / found.size, 3.0, 24.0))
+    size = mark_size(found.size)
     handles: list[Artist] = [
         ax.scatter(x[found == n], y[found == n], size, color=color, linewidths=0, label=motion_label(data, n))
         for n, color in colors.items()

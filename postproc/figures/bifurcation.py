@@ -11,14 +11,13 @@ from postproc.figures.cells import cell_edges, hatch_cells, is_geometric, tick_l
 from postproc.figures.drawing import Drawing
 from postproc.figures.palette import NOT_DONE, categories
 from postproc.signals.sections import section_of, sections_along
-from postproc.store.axes import axes_of, find_axis, ordered_axes, source
+from postproc.store.axes import axes_of, find_axis, ordered_axes, refusal
 from postproc.store.branch_points import is_of_points, one_case
 from postproc.store.open import open_store
 from postproc.store.run_ups import is_run_up
 from postproc.store.select import at_most_loaded_stator, first_of_rest, select
 from postproc.store.units import displayed, meanings, scale_of, short_name
 from postproc.store.variables import require_results, require_variables
-from rubhpc.errors import InputError
 from rubhpc.schema import HAS_VALUES, INFERRED
 from rubhpc.study.axes import DIRECTION, DIRECTIONS
 
@@ -72,9 +71,9 @@ def bifurcation(
         return _of_branches(cases, signal, over)
     if is_run_up(cases):
         fix = "draw the section of one case, or the orders by rubhpc bode"
-        raise InputError(f"{source(cases)}: bifurcation: the speed changes, and no motion is steady; {fix}")
+        raise refusal(cases, f"bifurcation: the speed changes, and no motion is steady; {fix}")
     if over is not None:
-        raise InputError(f"{source(cases)}: over: is for branches; give the store of a study with [branch]")
+        raise refusal(cases, "over: is for branches; give the store of a study with [branch]")
     coloring = default_coloring(cases, color)
     axis = default_axis(cases, along)
     over = coloring if coloring == DIRECTION else None
@@ -139,13 +138,7 @@ def draw_simulated(data: xr.Dataset, signal: str, ax: Axes) -> Axes:
 
 
 def default_axis(store: xr.Dataset, along: str | None = None) -> str:
-    """Return the axis named, or else the longest one.
-
-    Raises
-    ------
-    InputError
-        There is no such axis, or none of several values.
-    """
+    """Return the axis named, or else the longest one; InputError where there is none of several values."""
     if along:
         return find_axis(store, along)
     axes = ordered_axes(store, "a bifurcation diagram")
@@ -155,16 +148,12 @@ def default_axis(store: xr.Dataset, along: str | None = None) -> str:
 def default_coloring(store: xr.Dataset, color: str | None = None) -> str:
     """Return the colouring named, or else the direction of the sweep where there are two, or the regime.
 
-    Raises
-    ------
-    InputError
-        By the direction of the sweep in a store with a single one.
+    InputError of a direction in a store with a single one.
     """
     ways = store.sizes.get(DIRECTION, 1)
     if color == DIRECTION and ways < 2:
-        raise InputError(
-            f'{source(store)}: color: the store has one direction; sweep an axis "both" ways, '
-            'or color by "regime"'
+        raise refusal(
+            store, 'color: the store has one direction; sweep an axis "both" ways, or color by "regime"'
         )
     return color or (DIRECTION if ways > 1 else "regime")
 

@@ -60,8 +60,6 @@ def bode(
         May be repeated [default: vertical].
     order
         Multiple of the spin speed; 1 is 1X.
-    over
-        Draw the cases along AXIS over one another.
     """
     named = (signal,) if isinstance(signal, str) else signal
     signals = tuple(dict.fromkeys(named)) or (default_signal(cases, "vertical"),)

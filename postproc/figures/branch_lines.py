@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from postproc.figures.palette import categories
-from postproc.store.axes import source
+from postproc.store.axes import refusal
 from postproc.store.branch_points import followed, is_of_points, other_axes
 from postproc.store.units import displayed, scale_of
-from rubhpc.errors import InputError
 from rubhpc.schema import BRANCH_EVENT
 
 if TYPE_CHECKING:
@@ -38,8 +37,7 @@ _STYLES: dict[bool, dict[str, Any]] = {
 def draw_branches(data: xr.Dataset, variable: str, along: str, ax: Axes) -> Axes:
     """Draw a variable of the points of branches over the axis that they follow.
 
-    Of several values a point, such as a section, there is a line each, in their order: a motion of two
-    revolutions has two. Points of a branch are in order, so that lines turn at folds.
+    Of several values a point, as of a section, there is a line each: a motion of two revolutions has two.
     """
     scale = scale_of(data[variable])
     x, _ = displayed(data[along])
@@ -103,25 +101,20 @@ def name_branches(axes: Sequence[Axes]) -> None:
 def events_at(points: xr.Dataset, shown: xr.Dataset, x: str, y: str) -> xr.Dataset:
     """Return the events of branches in the plane of two axes of a map, at the values of its other axes.
 
-    Raises
-    ------
-    InputError
-        The store has no branches, or they do not run in this plane.
+    InputError where the store has no branches, or they do not run in this plane.
     """
     if not is_of_points(points):
-        raise InputError(
-            f"{source(points)}: events: has no branches; give the store of a study with [branch]"
-        )
+        raise refusal(points, "events: has no branches; give the store of a study with [branch]")
     lacking = [name for name in (x, y) if name not in points.coords]
     if lacking or followed(points) not in (x, y):
         why = f"its branches follow {followed(points)}, the map is over {x} and {y}"
-        raise InputError(f"{source(points)}: events: {why}; choose axes with --x and --y")
+        raise refusal(points, f"events: {why}; choose axes with --x and --y")
     is_here = np.isin(points["event"].values, [BRANCH_EVENT.index(name) for name in MARKED])
     for name in other_axes(points):
         if name not in (x, y) and name in shown.coords and shown[name].ndim == 0:
             is_here &= np.isclose(points[name].values, float(shown[name]), rtol=1e-6)
     if not is_here.any():
-        raise InputError(f"{source(points)}: events: there is none at the values of the map; select others")
+        raise refusal(points, "events: there is none at the values of the map; select others")
     return points.isel(point=np.flatnonzero(is_here))
 
 

@@ -16,7 +16,7 @@ from postproc.figures.cascade_lines import (
 )
 from postproc.figures.cells import cell_edges, is_geometric, tick_levels
 from postproc.figures.drawing import Drawing
-from postproc.figures.options import end_of_abscissa, hertz
+from postproc.figures.options import above_zero
 from postproc.signals.cascade import below, default_axis, hold_peaks, hold_rows
 from postproc.signals.cascade import cascade as cascade_data
 from postproc.signals.lines import SPIKE, parse_orders, spikes
@@ -67,14 +67,6 @@ def cascade(
         Other axes are taken at their first value.
     signal
         Which recorded signal [default: torsion].
-    full
-        Forward and backward whirl of the orbit instead of a signal.
-    probes
-        Names of two probes at one place, whose orbit is taken in place of the disc's.
-    node
-        Node of the rotor whose orbit is taken: the recorded one, or one with two probes.
-    stator
-        Number of a stator, at whose node the orbit is taken.
     along
         The axis of the cascade [default: the speed].
     form
@@ -90,7 +82,7 @@ def cascade(
     """
     lines = parse_orders(order_lines, "--order-lines")
     along = find_axis(cases, along) if along else default_axis(cases)
-    given = end_of_abscissa(max, orders)
+    given = above_zero(max, "" if orders else "Hz", "--max")
     cases, notes = first_of_rest(cases, [along, "stator"], "status")
     cases, name = signal_or_whirl(cases, signal, "torsion", full, probes, node, stator)
     spectra = cascade_data(cases, name, along)
@@ -98,14 +90,16 @@ def cascade(
     if full:  # lateral motion alone
         frequencies.pop("torsional", None)
     for marked, value in (mark or {}).items():
-        frequencies[marked] = hertz(value, f"--mark {marked}")
+        frequencies[marked] = above_zero(value, "Hz", f"--mark {marked}")
     abscissa = "order" if orders else "frequency"
     limit = given or (_MOST_ORDER if orders else default_limit(spectra, frequencies))
 
     def draw(axes: list[Axes]) -> None:
         is_waterfall = form == "waterfall"
-        picture = waterfall if is_waterfall else intensity
-        picture(spectra, axes[0], limit, abscissa)
+        if is_waterfall:
+            waterfall(hold_rows(below(spectra, limit, abscissa), _ROWS), axes[0], limit, abscissa)
+        else:
+            intensity(spectra, axes[0], limit, abscissa)
         colors = ("0.35", "white") if is_waterfall else ("0.8", "0.1")
         draw_orders(axes[0], spectra, lines, abscissa, *colors)
         draw_frequencies(axes[0], spectra, frequencies, abscissa, "C1" if is_waterfall else "#56B4E9")
@@ -115,21 +109,20 @@ def cascade(
 
 
 def waterfall(
-    spectra: xr.DataArray, ax: Axes, limit: float, abscissa: str = "frequency", height: float = 0.22
+    spectra: xr.DataArray,
+    ax: Axes,
+    limit: float,
+    abscissa: str = "frequency",
+    height: float = 0.22,
+    spike: float = SPIKE,
 ) -> Axes:
     """Draw the spectra of a cascade above one another, each on the value of its axis.
 
-    Parameters
-    ----------
-    spectra : (along, order)
-        From `cascade`; only what is drawn is loaded.
-    limit : float
-        End of the abscissa, Hz or orders.
-    abscissa : {"frequency", "order"}
-    height : float
-        Of the highest line, as a part of the ordinate.
+    `spectra` (along, order) are those of `cascade`, of which only what is drawn is loaded; `limit` is the end
+    of the abscissa, Hz or orders, `height` that of the highest line, as a part of the ordinate, and `spike`
+    half the width of each line, as a part of the abscissa.
     """
-    spectra = hold_rows(below(spectra, limit, abscissa), _ROWS).compute()
+    spectra = below(spectra, limit, abscissa).compute()
     require_results(spectra, spectra.to_dataset(name="spectra"))
     rows, label = ordinate(spectra)
     spectra = spectra.where(np.abs(spectra["order"]) > 1e-9)  # the mean is no line
@@ -142,7 +135,7 @@ def waterfall(
         if not has_result[i]:
             ax.axhline(rows[i], color="0.6", linewidth=0.5, linestyle=(0, (1, 2)), zorder=2)
             continue
-        at, line = spikes(x[i], gain * np.nan_to_num(spectra.values[i]), SPIKE * limit)
+        at, line = spikes(x[i], gain * np.nan_to_num(spectra.values[i]), spike * limit)
         order = 3 + (rows.max() - rows[i]) / span
         ax.fill_between(at, rows[i], rows[i] + line, color="white", linewidth=0, zorder=order)
         ax.plot(at, rows[i] + line, color="C0", linewidth=0.5, zorder=order)

@@ -56,7 +56,10 @@ def draw_orders(
                 tagged.append(float(x[-1]))
         else:
             at, side = (right, "right") if order > 0 else (left, "left")
-            y = float(np.interp(abs(at), np.abs(x), rows))
+            (x_in, x_out), (y_in, y_out) = (
+                values[inside[-1] : inside[-1] + 2].tolist() for values in (x, rows)
+            )
+            y = y_in + (at - x_in) / (x_out - x_in) * (y_out - y_in)
             if y > highest:
                 at, y = float(np.interp(highest, rows, x)), highest
             _tag(ax, at, y, f"{order}X", color, ground, side)
@@ -134,11 +137,11 @@ def _to_the_top(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Ordinates and spin rates with one more at the top of the axes, beyond the spectra, for names.
 
-    The rate goes on as between the last two rows.
+    The rate goes on as between the last two rows, or as it is where it falls there: the lines would meet.
     """
     if rows.size < 2 or not top > rows[-1]:
         return rows, rate
-    slope = (rate[-1] - rate[-2]) / (rows[-1] - rows[-2])
+    slope = max(0.0, (rate[-1] - rate[-2]) / (rows[-1] - rows[-2]))
     return np.append(rows, top), np.append(rate, rate[-1] + slope * (top - rows[-1]))
 
 

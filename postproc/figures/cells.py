@@ -27,13 +27,8 @@ _PANEL = 0.85  # of the room for axes and their labels, taken by the axes
 def tick_levels(ax: Axes, which: str, levels: xr.DataArray, at: NDArray[np.float64] | None = None) -> None:
     """Tick the values of a coordinate, and label the first and, going on, each that has room.
 
-    Set limits and scale of the axes first. An axis of many values keeps its ticks.
-
-    Parameters
-    ----------
-    which : {"x", "y"}
-    at : (n,), optional
-        Where the values are on the axes, if not at their displayed value.
+    Set limits and scale of the axes first. An axis of many values keeps its ticks. Values that are not at
+    their displayed value on the axes are `at` (n,).
     """
     from matplotlib.ticker import NullLocator
 

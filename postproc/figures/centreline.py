@@ -39,12 +39,6 @@ def centreline(
     ----------
     cases
         One case of a study with [run_up].
-    probes
-        Names of two probes at one place, whose position is drawn in place of the disc's.
-    node
-        Node of the rotor whose position is drawn: the recorded one, or one with two probes.
-    stator
-        Number of a stator, at whose node the position is drawn.
     """
     cases = moved_at(cases, probes, node, stator)
     shown = mean_positions(cases, ["vertical", "horizontal"])
@@ -65,8 +59,7 @@ def draw_centreline(
 ) -> Axes:
     """Draw the mean position, vertical over horizontal; positive spin turns clockwise.
 
-    A `clearance` is a circle, unless it is far beyond: its radius and the horizontal and vertical position of
-    its middle, m.
+    A `clearance` is a circle, unless it is far beyond: radius, and horizontal and vertical position, m.
     """
     x, y, speed = (data[name].values for name in ("horizontal", "vertical", "speed"))
     scale = scale_for("m", float(np.nanmax(np.hypot(x, y))))

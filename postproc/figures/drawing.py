@@ -40,30 +40,31 @@ def new_figure(
     n_column: int = 1,
     is_shared: bool = True,
 ) -> tuple[Figure, list[Axes]]:
-    """Return a figure with `n_panel` rows of axes that share their abscissa and, in columns, their ordinate.
+    """Return a figure and its axes, row by row; call it within `house_style`.
 
-    Without `is_shared` they share nothing.
-
-    Width and height are in mm; by default it is one journal column wide and each row takes its share of the
-    height. The axes come row by row. Call it within `house_style`.
+    They share their abscissa and, in columns, their ordinate, or nothing without `is_shared`. Width and
+    height are in mm; by default it is one journal column wide and each row takes its share of the height.
     """
     # Made without pyplot: no display is looked for, and nothing is left open behind the caller's back.
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=figure_size(n_panel, height, width))
+    figure = Figure(figsize=_size(n_panel, height, width))
     FigureCanvasAgg(figure)
-    axes = figure.subplots(
-        n_panel, n_column, sharex=is_shared, sharey=is_shared and n_column > 1, squeeze=False
-    )
-    return figure, list(axes.ravel())
+    return figure, _panels(figure, n_panel, n_column, is_shared)
 
 
-def figure_size(n_panel: int, height: float | None, width: float | None) -> tuple[float, float]:
-    """Return width and height of a figure, inches; given ones are in mm, the others as `new_figure` says."""
+def _size(n_panel: int, height: float | None, width: float | None) -> tuple[float, float]:
+    """Width and height of a figure, inches; given ones are in mm."""
     default = 63 if n_panel == 1 else 10 + 27 * n_panel
-    inches = (default if height is None else height) / 25.4
-    return COLUMN_WIDTH if width is None else width / 25.4, inches
+    return COLUMN_WIDTH if width is None else width / 25.4, (default if height is None else height) / 25.4
+
+
+def _panels(figure: Figure, n_row: int, n_column: int, is_shared: bool) -> list[Axes]:
+    axes = figure.subplots(
+        n_row, n_column, sharex=is_shared, sharey=is_shared and n_column > 1, squeeze=False
+    )
+    return list(axes.ravel())
 
 
 def check_figure_path(path: str | Path) -> Path:
@@ -89,37 +90,17 @@ def save(figure: Figure, path: str | Path) -> Path:
 
 @dataclass(frozen=True, kw_only=True)
 class Drawing:
-    """A figure that is still to be drawn: what a figure function returns.
+    """A figure that is still to be drawn: what a figure function returns."""
 
-    Attributes
-    ----------
-    shown : Dataset
-        The data of the figure, as `--data` writes them; coordinates of one value make the caption.
-    draw : callable
-        Draws on a list of axes, row by row.
-    panels : (n_row, n_column), optional
-        Of a figure of several axes; without, it has one.
-    is_shared : bool
-        Whether its axes have one abscissa, and those of a row one ordinate.
-    height, width : float, optional
-        mm; by default as in `postproc.figures.drawing.new_figure`.
-    lines : tuple of str
-        What the figure command prints before it draws.
-    verdict : tuple of str
-        What the caption says besides: of a single case `postproc.cases.maps.verdict_of`, of a map its model.
-    files : mapping of Path to Dataset
-        Further data that the options ask to write.
-    """
-
-    shown: xr.Dataset
-    draw: Callable[[list[Axes]], Any]
-    panels: tuple[int, int] | None = None
-    is_shared: bool = True
-    height: float | None = None
+    shown: xr.Dataset  # as `--data` writes it; coordinates of one value make the caption
+    draw: Callable[[list[Axes]], Any]  # on a list of axes, row by row
+    panels: tuple[int, int] | None = None  # rows and columns of a figure of several axes
+    is_shared: bool = True  # whether its axes have one abscissa, and those of a row one ordinate
+    height: float | None = None  # mm; by default as in `new_figure`
     width: float | None = None
-    lines: tuple[str, ...] = ()
-    verdict: tuple[str, ...] = ()
-    files: Mapping[Path, xr.Dataset] = field(default_factory=dict)
+    lines: tuple[str, ...] = ()  # what the figure command prints before it draws
+    verdict: tuple[str, ...] = ()  # what the caption says besides
+    files: Mapping[Path, xr.Dataset] = field(default_factory=dict)  # further data that options ask to write
 
     def save(self, path: str | Path) -> Path:
         """Draw the figure, write it as png, pdf or svg, and return its path; needs no display."""
@@ -127,20 +108,24 @@ class Drawing:
         with house_style():
             figure, axes = new_figure(n_row, self.height, self.width, n_column, self.is_shared)
             self.draw(axes)
-            figure.suptitle(caption(self.shown, self.verdict), fontsize=7, x=0.02, ha="left")
+            self._write_caption(figure)
             return save(figure, path)
 
     def show(self, ax: Axes | Sequence[Axes] | None = None) -> Axes | list[Axes]:
         """Draw on the axes given, or else on a new figure of pyplot, and return the axes.
 
-        Raises
-        ------
-        InputError
-            `ax` has another number of axes than the figure.
+        InputError where `ax` has another number of axes than the figure.
         """
         n_row, n_column = self.panels or (1, 1)
         if ax is None:
-            axes = self._new_axes(n_row, n_column)
+            from matplotlib import pyplot
+
+            # Outside the style: what pyplot sets up in a notebook with its first figure would end with it.
+            size = _size(n_row, self.height, self.width)
+            figure = pyplot.figure(figsize=size, dpi=150, layout="constrained")
+            with house_style():
+                axes = _panels(figure, n_row, n_column, self.is_shared)
+                self._write_caption(figure)
         else:
             axes = list(ax) if isinstance(ax, Iterable) else [ax]
             if len(axes) != n_row * n_column:
@@ -149,19 +134,5 @@ class Drawing:
             self.draw(axes)
         return axes if self.panels else axes[0]
 
-    def _new_axes(self, n_row: int, n_column: int) -> list[Axes]:
-        from matplotlib import pyplot
-
-        # Outside the style: what pyplot sets up in a notebook with its first figure would end with the style.
-        size = figure_size(n_row, self.height, self.width)
-        figure = pyplot.figure(figsize=size, dpi=150, layout="constrained")
-        with house_style():
-            made = figure.subplots(
-                n_row,
-                n_column,
-                sharex=self.is_shared,
-                sharey=self.is_shared and n_column > 1,
-                squeeze=False,
-            )
-            figure.suptitle(caption(self.shown, self.verdict), fontsize=7, x=0.02, ha="left")
-        return list(made.ravel())
+    def _write_caption(self, figure: Figure) -> None:
+        figure.suptitle(caption(self.shown, self.verdict), fontsize=7, x=0.02, ha="left")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 
 from postproc.figures.drawing import Drawing
-from postproc.figures.options import end_of_abscissa
+from postproc.figures.options import above_zero
 from postproc.signals.contacts import runs_of
 from postproc.signals.hilbert_huang import (
     contact_bandwidth,
@@ -71,7 +71,7 @@ def hht(
     max
         End of the ordinate, Hz [default: twice the natural frequency].
     """
-    limit = end_of_abscissa(max, orders=False)
+    limit = above_zero(max, "Hz", "--max")
     signal = signal or default_signal(cases, "torsion")
     if signal in cases and "stator" in cases[signal].dims:  # its contacts and natural frequency too
         cases = at_most_loaded_stator(cases)
@@ -102,14 +102,8 @@ def energy_time_frequency(
 ) -> Axes:
     """Draw the energy of the first intrinsic mode over time and frequency; contact is shaded.
 
-    Parameters
-    ----------
-    limit : float, optional
-        End of the ordinate, Hz; by default twice the median frequency: out of contact, or else in it.
-    natural : mapping of name to Hz, optional
-        Natural frequencies to be marked.
-    colorbar : bool
-        Whether a colour bar is drawn next to `ax`.
+    The ordinate ends at `limit`, Hz, by default twice the median frequency: out of contact, or else in it.
+    Natural frequencies, Hz, are marked by their names.
     """
     mesh = _draw_energy(hht, ax, limit, natural or {}, 1)
     if colorbar:

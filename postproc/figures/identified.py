@@ -21,13 +21,7 @@ _PREDICTED, _MEASURED = "C0", "k"
 
 
 def corner(tree: xr.DataTree) -> Drawing:
-    """Return the posterior of each quantity, and of each pair.
-
-    Parameters
-    ----------
-    tree : DataTree
-        Of `rubhpc.identify`.
-    """
+    """Return the posterior of each quantity, and of each pair, from the tree of `rubhpc.identify`."""
     posterior, prior = (tree[group].to_dataset().isel(chain=0, drop=True) for group in ("posterior", "prior"))
     names = [str(name) for name in prior.data_vars]
     shown = posterior[names]
@@ -100,13 +94,7 @@ def _view(x: np.ndarray[Any, Any]) -> tuple[float, float]:
 
 
 def predicted(tree: xr.DataTree) -> Drawing:
-    """Return the measured spectra and orbit with those of some draws of the posterior.
-
-    Parameters
-    ----------
-    tree : DataTree
-        Of `rubhpc.identify`.
-    """
+    """Return measured spectra and orbit with those of some draws of the posterior of `rubhpc.identify`."""
     observed = tree["observed_data"].to_dataset()
     draws = tree["posterior_predictive"].to_dataset().isel(chain=0, drop=True)
     names = [

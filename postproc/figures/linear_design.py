@@ -10,7 +10,7 @@ import numpy as np
 
 from postproc.figures.cells import degree_steps
 from postproc.figures.drawing import Drawing
-from postproc.figures.run_up_marks import Labels
+from postproc.figures.run_up_marks import RPM, Labels
 from postproc.signals.orders import written_lag
 from rubhpc.errors import InputError
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 MOST_SHAPES = 6
 _ROOM = 0.12  # of the abscissa: that the name of a peak takes
 _CIRCLE = 0.1  # of the square of an orbit's size: difference of those of its axes, below which it is a circle
-_RPM = 30 / math.pi
 _BAND: dict[str, Any] = {"color": "0.9", "zorder": 0, "linewidth": 0}
 _MAJOR: dict[str, Any] = {"color": "0.7", "linewidth": 2.0}  # seen below those of a circle
 _BEARING: dict[str, Any] = {"marker": "^", "markersize": 5, "color": "k", "markerfacecolor": "white"}
@@ -56,14 +55,13 @@ def campbell_diagram(
     Parameters
     ----------
     curves : xarray.Dataset
-        `frequency` (Hz), `damping_ratio` and `whirl` over (mode, speed), with the coordinates `kind` and
-        `speed` (rad/s).
+        From `rubhpc.linear_design`.
     critical : sequence of float
         Critical speeds, rad/s, to be marked on the 1X line.
     limit : float, optional
         End of the ordinate, Hz; by default just above the highest curve.
     """
-    rpm = 30 / math.pi * curves["speed"].values
+    rpm = RPM * curves["speed"].values
     # an overdamped mode and a rigid body's do not oscillate: their curves are broken
     oscillates = (abs(curves["damping_ratio"]) < 1.0) & (curves["frequency"] > 0.0)
     frequency = curves["frequency"].where(oscillates).values
@@ -71,8 +69,6 @@ def campbell_diagram(
     drawn = set()
     for i_mode, kind in enumerate(curves["kind"].values):
         words = [whirl if kind == "lateral" else kind for whirl in curves["whirl"].values[i_mode]]
-        if np.isnan(frequency[i_mode]).all():
-            continue
         for word, part in _stretches(words):
             ax.plot(rpm[part], frequency[i_mode, part], **STYLES[word])
             at = frequency[i_mode, part]
@@ -83,7 +79,7 @@ def campbell_diagram(
         _draw_order(ax, order)
     if critical:
         speeds = np.asarray(critical)
-        ax.plot(30 / math.pi * speeds, speeds / (2 * math.pi), **_CRITICAL)
+        ax.plot(RPM * speeds, speeds / (2 * math.pi), **_CRITICAL)
         _number(ax, speeds)
     ax.set(xlabel="Spin speed (rpm)", ylabel="Natural frequency (Hz)")
     ax.ticklabel_format(style="plain")
@@ -116,7 +112,7 @@ def _number(ax: Axes, speeds: NDArray[np.float64]) -> None:
         for size, span in ((box.width, right - left), (box.height, np.ptp(ax.get_ylim())))
     )
     lines: list[list[float]] = []
-    for rpm in sorted(30 / math.pi * speeds):
+    for rpm in sorted(RPM * speeds):
         if not left <= rpm <= right:
             continue
         last = lines[-1] if lines else [-math.inf]
@@ -167,20 +163,11 @@ def _legend(ax: Axes, words: list[str], has_critical: bool) -> None:
 
 
 def unbalance_response(design: xr.Dataset, node: int) -> Drawing:
-    """Return the Bode diagram of a node: amplitude and phase of its unbalance response over the speed.
+    """Return the Bode diagram of a node from `rubhpc.linear_design`, of two panels.
 
-    Parameters
-    ----------
-    design : xarray.Dataset
-        From `rubhpc.linear_design`.
-    node : int
-
-    Returns
-    -------
-    Drawing
-        Of two panels. Above, the major semi-axis of the orbit and the amplitudes at the probes, peaks with
-        their speed and amplification factor, and the operating range as a band; below, the phase lag, which
-        grows downwards as in `postproc.figures.bode` and as API RP 684 and machinery diagnostics draw it.
+    Above, the major semi-axis of the orbit and the amplitudes at the probes, peaks with their speed and
+    amplification factor, and the operating range as a band; below, the phase lag, which grows downwards as in
+    `postproc.figures.bode` and as API RP 684 and machinery diagnostics draw it.
     """
     if node not in design["node"].values:
         raise InputError(
@@ -192,9 +179,9 @@ def unbalance_response(design: xr.Dataset, node: int) -> Drawing:
 
     def draw(axes: list[Axes]) -> list[Axes]:
         amplitude, phase = axes
-        rpm = _RPM * shown["response_speed"].values
+        rpm = RPM * shown["response_speed"].values
         if "operating" in design.attrs:
-            ends = _RPM * np.array(design.attrs["operating"])
+            ends = RPM * np.array(design.attrs["operating"])
             amplitude.axvspan(*ends, **_BAND, label="operating speeds")
             phase.axvspan(*ends, **_BAND)
         amplitude.plot(rpm, 1e6 * shown["major_axis"].values, label="major semi-axis", **_MAJOR)
@@ -221,19 +208,14 @@ def unbalance_response(design: xr.Dataset, node: int) -> Drawing:
 
 
 def mode_shapes(design: xr.Dataset) -> Drawing:
-    """Return the mode shapes at the critical speeds, the lowest six, along the shaft.
+    """Return the mode shapes at the critical speeds of a linear design, the lowest six, along the shaft.
 
     Each is drawn at the instant of its greatest displacement, which is 1, with the size of its orbits around;
     triangles are bearings and seals.
-
-    Parameters
-    ----------
-    design : xarray.Dataset
-        From `rubhpc.linear_design`.
     """
     n_critical = min(design.sizes["critical"], MOST_SHAPES)
     if not n_critical:
-        low, high = (_RPM * speed for speed in design.attrs["speed_range"])
+        low, high = (RPM * speed for speed in design.attrs["speed_range"])
         raise InputError(f"shapes: no critical speed from {low:.6g} to {high:.6g} rpm; widen the range")
     names = [name for name in design.data_vars if str(name).startswith(("critical_", "shape_"))]
     shown = design[[*names, "is_excited"]].isel(critical=slice(n_critical))
@@ -271,7 +253,7 @@ def _draw_shape(ax: Axes, place: np.ndarray[Any, Any], one: xr.Dataset) -> None:
     ax.axhline(0.0, color="0.6", linewidth=0.4)
     ax.plot(place, v, marker=".", label="vertical", **_PROBES[0])
     ax.plot(place, w, marker=".", label="horizontal", **_PROBES[1])
-    rpm = _RPM * float(one["critical_speed"])
+    rpm = RPM * float(one["critical_speed"])
     excited = "" if bool(one["is_excited"]) else ", not excited"
     ax.set_title(f"{rpm:.0f} rpm, {one['critical_whirl'].item()}{excited}", fontsize=6, pad=2)
 
@@ -281,7 +263,7 @@ def _name_peaks(ax: Axes, peaks: xr.Dataset) -> None:
     taken: list[float] = []
     for i in np.argsort(-peaks["peak_amplitude"].values):
         peak = peaks.isel(peak=i)
-        rpm = _RPM * float(peak["peak_speed"])
+        rpm = RPM * float(peak["peak_speed"])
         if any(abs(rpm - other) < _ROOM * ax.get_xlim()[1] for other in taken):
             continue
         taken.append(rpm)

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from postproc.cases.maps import default_axes, facet_axes, map_data, out_of_range, scatter_axes
+from postproc.cases.sobol import is_log
 from postproc.figures.branch_lines import events_at, mark_over_map
 from postproc.figures.cells import cell_edges, hatch_cells, is_geometric, outline_cells, tick_levels
 from postproc.figures.drawing import Drawing
 from postproc.figures.palette import CATEGORIES, NOT_DONE, NOT_SETTLED, WARNING, coloured, paint_of
-from postproc.figures.scatter import scatter_maps
+from postproc.figures.scatter import mark_cases, mark_size
 from postproc.figures.small_multiples import color_bar, legend_below, name_facets, write_over
-from postproc.store.axes import drawn_axes, source
+from postproc.store.axes import drawn_axes, refusal
 from postproc.store.open import open_store
 from postproc.store.rig_of_case import model_of
 from postproc.store.select import first_of_rest, worst_of_stators
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.lines import Line2D
     from numpy.typing import NDArray
 
     from postproc.figures.options import Axis, Bounds, File, Metavar
@@ -37,6 +39,7 @@ if TYPE_CHECKING:
     Edges = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
+_MOST_DRAWN = 5000  # marks of a sample in a pdf or svg; of more, they become a picture in it
 _PANEL = 200.0  # points: the shorter side of a panel, about
 
 
@@ -81,11 +84,11 @@ def map(  # noqa: A001 - the name of the command
     named = [facet] if isinstance(facet, str) else list(facet)
     is_sample = bool(drawn_axes(cases))
     if is_sample and contours:
-        raise InputError(f"{source(cases)}: map: points of a sample have no contours; leave --contours out")
+        raise refusal(cases, "map: points of a sample have no contours; leave --contours out")
     if is_sample and computed:
-        raise InputError(f"{source(cases)}: map: all cases of a sample are computed; leave --computed out")
+        raise refusal(cases, "map: all cases of a sample are computed; leave --computed out")
     if events is not None and (is_sample or named):
-        raise InputError(f"{source(cases)}: map: events go over one map of a grid; leave --facet out")
+        raise refusal(cases, "map: events go over one map of a grid; leave --facet out")
     across, up = scatter_axes(cases, x, y) if is_sample else default_axes(cases, x, y, named)
     spread = [CASE] if is_sample else [across, up]
     facets = facet_axes(cases, named, spread)
@@ -98,37 +101,35 @@ def map(  # noqa: A001 - the name of the command
     marked = None if events is None else events_at(open_store(events), shown, across, up)
 
     def draw(axes: list[Axes]) -> None:
-        if is_sample:
-            scatter_maps(shown, value, across, up, axes, log)
-        else:
-            value_maps(
-                shown,
-                value,
-                axes,
-                log,
-                contours or 0,
-                computed,
-                marks=lambda ax: [] if marked is None else mark_over_map(marked, shown, across, up, ax),
-            )
+        draw_maps(
+            shown,
+            value,
+            axes,
+            (across, up) if is_sample else None,
+            log=log,
+            n_contour=contours or 0,
+            computed=computed,
+            marks=lambda ax: [] if marked is None else mark_over_map(marked, shown, across, up, ax),
+        )
 
-    if not facets:
-        return Drawing(shown=shown, draw=draw, height=75.0, lines=tuple(notes), verdict=model)
-    n_row, n_column = ([1] + [shown.sizes[axis] for axis in facets])[-2:]
+    n_row, n_column = ([1, 1] + [shown.sizes[axis] for axis in facets])[-2:]
     return Drawing(
         shown=shown,
         draw=draw,
-        panels=(n_row, n_column),
+        panels=(n_row, n_column) if facets else None,
         height=30.0 + 45.0 * n_row,
-        width=180.0,
+        width=180.0 if facets else None,
         lines=tuple(notes),
         verdict=model,
     )
 
 
-def value_maps(
+def draw_maps(
     data: xr.Dataset,
     value: str,
     axes: Sequence[Axes],
+    drawn: tuple[str, str] | None = None,
+    *,
     log: bool = False,
     n_contour: int = 0,
     computed: bool = False,
@@ -136,69 +137,68 @@ def value_maps(
 ) -> Sequence[Axes]:
     """Draw maps from `map_data`, one for each value of its facets, in one scale of colours.
 
-    Flags and periods have distinct colours, other measures a continuous bar and, where asked for, contours.
-    Cases without a result are grey and hatched by their status; those that had not settled, or are out of the
-    model's range, by lines; where most are out of range, a line around these leaves the colours to be seen.
-
-    Parameters
-    ----------
-    data : Dataset over (row, column, y, x), (column, y, x) or (y, x)
-    axes : sequence of Axes
-        As many as there are facets, row by row.
-    n_contour : int
-        Contour lines at about so many levels.
-    computed : bool
-        Whether dots mark the cases that were computed.
-    marks : callable
-        Draws over the first map, and returns what the legend is to name.
+    Flags and periods have distinct colours, other measures a continuous bar and, where asked for, contours at
+    about `n_contour` levels. Cases without a result are grey and hatched by their status; those that had not
+    settled, or are out of the model's range, by lines; where most are out of range, a line around these
+    leaves the colours to be seen. `computed` marks the computed cases by dots; `marks` draws over the first
+    map, and returns what the legend is to name. A sample is drawn as one mark a case over what was `drawn`,
+    across and up.
     """
-    *facets, y_name, x_name = [str(name) for name in data[value].dims]
-    data = data.sortby([*facets, y_name, x_name])
+    dims = [str(name) for name in data[value].dims]
+    facets, (x_name, y_name) = (dims[:-1], drawn) if drawn else (dims[:-2], (dims[-1], dims[-2]))
+    if not drawn:
+        data = data.sortby(dims)
     x, x_label = displayed(data[x_name])
     y, y_label = displayed(data[y_name])
-    edges = cell_edges(x), cell_edges(y)
+    edges = None if drawn else (cell_edges(x), cell_edges(y))
     shown, is_known = coloured(data, value)
     paint = paint_of(shown, log)
     if n_contour and value in CATEGORIES:
         raise InputError(f"map: {value} has no contours; draw it without --contours")
     levels = _levels(paint, n_contour) if n_contour and min(x.size, y.size) > 1 else np.array([])
-    handles: dict[str, Artist] = {}
+    handles: list[Artist] = []
     for ax, place in zip(axes, np.ndindex(*(data.sizes[f] for f in facets)), strict=True):
-        here = dict(zip(facets, place, strict=True))
-        cells = paint.cells(shown.isel(here).values)
-        mesh = ax.pcolormesh(*edges, cells, norm=paint.norm, cmap=paint.cmap, rasterized=True)
-        inside = levels[(levels > cells.min()) & (levels < cells.max())] if cells.count() else []
-        if len(inside):
-            ax.contour(x, y, cells, levels=inside, colors="white", linewidths=0.5)
-        if not is_known:
-            for patch in _hatch(ax, edges, data.isel(here), value, *out_of_range(data)):
-                handles[str(patch.get_label())] = patch
-        if computed:
-            handles |= _dots(ax, x, y, data["status"].isel(here).values)
-        for values, name in ((x, "x"), (y, "y")):
-            if is_geometric(values):
-                getattr(ax, f"set_{name}scale")("log")
-        ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
+        here = data.isel(dict(zip(facets, place, strict=True)))
+        cells = paint.cells(shown.isel(dict(zip(facets, place, strict=True))).values)
+        style: dict[str, Any] = {"norm": paint.norm, "cmap": paint.cmap}
+        if edges is None:
+            is_there = ~np.ma.getmaskarray(cells)
+            style |= {"linewidths": 0, "rasterized": x.size > _MOST_DRAWN, "zorder": 2}
+            drawing: Any = ax.scatter(x[is_there], y[is_there], mark_size(x.size), cells[is_there], **style)
+            if not is_known:
+                handles += mark_cases(ax, x, y, here, value, out_of_range(data)[0])
+        else:
+            drawing = ax.pcolormesh(*edges, cells, rasterized=True, **style)
+            inside = levels[(levels > cells.min()) & (levels < cells.max())] if cells.count() else []
+            if len(inside):
+                ax.contour(x, y, cells, levels=inside, colors="white", linewidths=0.5)
+            if not is_known:
+                handles += _hatch(ax, edges, here, value, *out_of_range(data))
+            if computed:
+                handles += _dots(ax, x, y, here["status"].values)
+            ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
+        for name, values, letter in ((x_name, x, "x"), (y_name, y, "y")):
+            if is_log(data, name) if drawn else is_geometric(values):
+                getattr(ax, f"set_{letter}scale")("log")
         if note := paint.note(cells):
             write_over(ax, note)
-    handles |= {str(mark.get_label()): mark for mark in marks(axes[0])}
-    tick_levels(axes[0], "x", data[x_name])
-    tick_levels(axes[0], "y", data[y_name])
+    handles += marks(axes[0])
+    if edges is not None:
+        tick_levels(axes[0], "x", data[x_name])
+        tick_levels(axes[0], "y", data[y_name])
     if paint.has_bar:
-        bar = color_bar(axes, mesh, paint)
+        bar = color_bar(axes, drawing, paint)
         bar.ax.hlines(levels, *bar.ax.get_xlim(), color="white", linewidth=0.5)
     name_facets(axes, data, facets, x_label, y_label)
-    legend_below(axes[0], list(handles.values()))
+    legend_below(axes[0], list({str(mark.get_label()): mark for mark in handles}.values()))
     return axes
 
 
-def _dots(
-    ax: Axes, x: NDArray[np.float64], y: NDArray[np.float64], status: NDArray[np.int8]
-) -> dict[str, Artist]:
+def _dots(ax: Axes, x: NDArray[np.float64], y: NDArray[np.float64], status: NDArray[np.int8]) -> list[Line2D]:
     """Mark the cases that were computed, and return what names them."""
     rows, columns = np.nonzero((status != MISSING) & (status != INFERRED))
     spacing = min(_PANEL / len(x), _PANEL / len(y))  # points of a page between two cases, about
-    (dots,) = ax.plot(
+    return ax.plot(
         x[columns],
         y[rows],
         linestyle="",
@@ -209,7 +209,6 @@ def _dots(
         rasterized=True,
         label="computed",
     )
-    return {"computed": dots}
 
 
 def _hatch(ax: Axes, edges: Edges, data: xr.Dataset, value: str, beyond: str, is_most: bool) -> list[Artist]:
@@ -241,7 +240,6 @@ def _levels(paint: Paint, n_contour: int) -> NDArray[np.float64]:
     from matplotlib.colors import LogNorm
     from matplotlib.ticker import MaxNLocator
 
-    assert paint.norm is not None
     low, high = float(paint.norm.vmin or 0.0), float(paint.norm.vmax or 0.0)
     if isinstance(paint.norm, LogNorm):
         levels = np.geomspace(low, high, n_contour + 2)

@@ -9,10 +9,9 @@ import numpy as np
 from postproc.figures.branch_lines import draw_lines, mark_events, name_branches
 from postproc.figures.drawing import Drawing
 from postproc.figures.palette import categories
-from postproc.store.axes import source
+from postproc.store.axes import refusal
 from postproc.store.branch_points import is_of_points, one_case
 from postproc.store.units import displayed, plain_number
-from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,12 +38,12 @@ def multipliers(cases: xr.Dataset, *, branch: Count | None = None) -> Drawing:
         Number of one branch [default: all].
     """
     if not is_of_points(cases):
-        raise InputError(f"{source(cases)}: has no multipliers; give the store of a study with [branch]")
+        raise refusal(cases, "has no multipliers; give the store of a study with [branch]")
     points, along, notes = one_case(cases)
     if branch is not None:
         known = np.unique(points["branch"].values)
         if branch not in known:
-            raise InputError(f"{source(cases)}: branch: there is no {branch}; give one of 1 to {known.max()}")
+            raise refusal(cases, f"branch: there is no {branch}; give one of 1 to {known.max()}")
         points = points.isel(point=np.flatnonzero(points["branch"].values == branch))
     shown = points[["multiplier_real", "multiplier_imag", "stability", "event"]]
 
@@ -87,18 +86,8 @@ def draw_plane(data: xr.Dataset, ax: Axes) -> Axes:
 def at_edges(values: NDArray[Any], limit: float) -> tuple[NDArray[Any], dict[str, NDArray[Any]]]:
     """Return the complex values in a square, and those beyond it by the arrow of the edge they are drawn at.
 
-    Parameters
-    ----------
-    values : (n,), complex
-        NaN is passed over.
-    limit : float
-        Half the side of the square around zero.
-
-    Returns
-    -------
-    inside : (m,), complex
-    edges : dict
-        By the marker ">", "^", "<" or "v": the places on that edge, complex, on the ray from zero.
+    `limit` is half the side of the square around zero. The others are on the ray from zero, by their marker
+    ">", "^", "<" or "v". NaN is passed over.
     """
     values = values[np.isfinite(values)]
     reach = np.maximum(abs(values.real), abs(values.imag))

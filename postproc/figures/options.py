@@ -7,32 +7,14 @@ so that the command line knows them without loading the figure.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping as Mapping
+from collections.abc import Sequence as Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated
+from typing import Literal as Literal
 
 from rubhpc.errors import InputError
-
-__all__ = [
-    "Annotated",
-    "Axis",
-    "Bounds",
-    "Count",
-    "File",
-    "Hertz",
-    "Literal",
-    "Mapping",
-    "Metavar",
-    "Positive",
-    "Seed",
-    "Sequence",
-    "Share",
-    "Speed",
-    "end_of_abscissa",
-    "hertz",
-    "spin_speed",
-]
 
 
 @dataclass(frozen=True)
@@ -69,38 +51,24 @@ Count = Annotated[int, Bounds(least=1)]
 Seed = Annotated[int, Bounds(least=0)]
 Positive = Annotated[float, Bounds(least=0.0, is_open=True)]
 Share = Annotated[float, Bounds(least=0.0, most=1.0, is_open=True)]
+HELP = {  # of options that several figures have, unless the figure's own docstring has it
+    "full": "Forward and backward whirl of the orbit instead of a signal.",
+    "probes": "Names of two probes at one place, whose motion is taken in place of the disc's.",
+    "node": "Node of the rotor whose motion is taken: the recorded one, or one with two probes.",
+    "stator": "Number of a stator, at whose node the motion is taken.",
+    "over": "Draw the cases along AXIS over one another.",
+}
 
 
-def hertz(value: float | str, option: str) -> float:
-    """Return a frequency above 0, Hz, of a number or a text with or without a unit.
+def above_zero(value: float | str | None, unit: str, option: str) -> float | None:
+    """Return an option as a number above 0, of a number or a text with or without a unit; None of None.
 
-    Raises
-    ------
-    InputError
-        The text is not a frequency, or not above 0; `option` names it.
+    InputError where it is something else; `option` names it.
     """
-    return _above_zero(value, "Hz", option)
-
-
-def end_of_abscissa(value: float | str | None, orders: bool) -> float | None:
-    """Return the end of an abscissa, Hz or `orders` of the spin speed; None of none.
-
-    Raises
-    ------
-    InputError
-        It is not a frequency, or no number of orders, or not above 0.
-    """
-    return None if value is None else _above_zero(value, "" if orders else "Hz", "--max")
-
-
-def spin_speed(value: float | str, option: str) -> float:
-    """Return a spin speed above 0, rad/s, likewise."""
-    return _above_zero(value, "rad/s", option)
-
-
-def _above_zero(value: float | str, unit: str, option: str) -> float:
     from rubhpc.input.quantity import parse_quantity
 
+    if value is None:
+        return None
     with suppress(ValueError):  # text with a unit
         value = float(value)
     size = parse_quantity(value, unit, option)

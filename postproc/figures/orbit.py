@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 
 from postproc.figures.drawing import Drawing
-from postproc.figures.options import spin_speed
+from postproc.figures.options import above_zero
 from postproc.figures.run_up_marks import draw_rotation, title_of_speeds
 from postproc.figures.small_multiples import legend_below, overlaid
 from postproc.signals.places import moved_at
@@ -57,19 +57,11 @@ def orbit(
         Only the last ones [default: all], or how many around the speed `at` [default: 4].
     at
         Spin speed of a run-up, such as "2000 rpm", around which its orbit is drawn.
-    over
-        Draw the cases along AXIS over one another.
-    probes
-        Names of two probes at one place, whose motion is drawn in place of the disc's.
-    node
-        Node of the rotor whose motion is drawn: the recorded one, or one with two probes.
-    stator
-        Number of a stator, at whose node the motion is drawn.
     frame
         Follow the orbit, with the clearance and the centre without loads where they are near; show all of the
         clearance; or take the mean position off.
     """
-    speed = None if at is None else spin_speed(at, "--at")
+    speed = above_zero(at, "rad/s", "--at")
     shown = orbit_data(moved_at(cases, probes, node, stator), revolutions, over, speed)
 
     def draw(axes: list[Axes]) -> None:
@@ -83,12 +75,8 @@ def draw_orbit(data: xr.Dataset, ax: Axes, frame: str = "orbit") -> Axes:
     """Draw an orbit, or those along one axis over one another; positive spin turns clockwise.
 
     One case also shows the clearance circle, its stators, the first sample (ring), one point a revolution
-    (dots) and the sense of whirl (arrow); their labels make a legend.
-
-    Parameters
-    ----------
-    frame : {"orbit", "clearance", "mean"}
-        What is in view: the orbit and what is near it, all of the clearance, or the orbit about its mean.
+    (dots) and the sense of whirl (arrow); their labels make a legend. In view is what the `frame` names: the
+    "orbit" and what is near it, all of the "clearance", or the orbit about its "mean".
     """
     vertical, horizontal = data["vertical"].load(), data["horizontal"].load()
     require_results(vertical, data)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from postproc.store.units import plain_number, scale_of, short_name
+from postproc.store.units import in_words, plain_number, scale_of, short_name
 from rubhpc.errors import InputError
 from rubhpc.schema import (
     DIVERGED,
@@ -36,41 +36,30 @@ NOT_DONE = {
     DIVERGED: ("diverged", "0.6", "////"),
 }
 REGIME_COLORS = ("#56B4E9", "#009E73", "#E69F00", "#D55E00", "#CC79A7")
-PERIOD_COLORS = ("#D55E00", "#88CCEE", "#332288", "#999933", "#CC79A7")  # none, P1 to P4
-SETTLED_COLORS = ("#D55E00", "#56B4E9")
-NOT_SETTLED = SETTLED[0].replace("_", " ")
-SCHEME_COLORS = ("#56B4E9", "#E69F00", "#009E73", "#CC79A7", "#0072B2")
-RUB_COLORS = ("#ededed", "#56B4E9", "#009E73", "#E69F00", "#D55E00")
-STATUS_COLORS = ("#ededed", "#009E73", "#000000", "#D55E00", "#B8DFD2")
+_PERIOD_COLORS = ("#D55E00", "#88CCEE", "#332288", "#999933", "#CC79A7")  # none, P1 to P4
+_SCHEME_COLORS = ("#56B4E9", "#E69F00", "#009E73", "#CC79A7", "#0072B2")
+_FLAGS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "status": (STATUS, ("#ededed", "#009E73", "#000000", "#D55E00", "#B8DFD2")),
+    "regime": (REGIME, REGIME_COLORS),
+    "settled": (SETTLED, ("#D55E00", "#56B4E9")),
+    "scheme": (SCHEMES, _SCHEME_COLORS),
+    "record_end": (RECORD_END, _SCHEME_COLORS),
+    "rub_kind": (RUB_KIND, ("#ededed", "#56B4E9", "#009E73", "#E69F00", "#D55E00")),
+}
+CATEGORIES = ("period", *_FLAGS)
 # Motions that starts reach, by number; the contact-free one has the colour of its regime.
 MOTION_COLORS = (
-    "#E69F00",
-    "#009E73",
-    "#CC79A7",
-    "#0072B2",
-    "#D55E00",
-    "#F0E442",
-    "#332288",
-    "#999933",
-    "#882255",
+    *("#E69F00", "#009E73", "#CC79A7", "#0072B2", "#D55E00", "#F0E442", "#332288", "#999933", "#882255"),
 )
+NOT_SETTLED = in_words(SETTLED[0])
 WARNING = "#D55E00"  # seen on the dark and on the light end of the colour bar
-CATEGORIES = ("status", "regime", "period", "settled", "scheme", "record_end", "rub_kind")
-_FLAGS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    "status": (STATUS, STATUS_COLORS),
-    "regime": (tuple(name.replace("quasi_", "quasi-").replace("_", " ") for name in REGIME), REGIME_COLORS),
-    "settled": (tuple(name.replace("_", " ") for name in SETTLED), SETTLED_COLORS),
-    "scheme": (tuple(name.replace("_", " ") for name in SCHEMES), SCHEME_COLORS),
-    "record_end": (tuple(name.replace("_", " ") for name in RECORD_END), SCHEME_COLORS),
-    "rub_kind": (tuple(name.replace("_", " ") for name in RUB_KIND), RUB_COLORS),
-}
 
 
 class Paint(NamedTuple):
     """How values become colours, the same on every panel."""
 
     cells: Callable[[NDArray[Any]], np.ma.MaskedArray[Any, Any]]  # values to what is drawn
-    norm: Normalize | None
+    norm: Normalize
     cmap: Any
     label: str
     ticks: list[int] | None = None
@@ -84,7 +73,7 @@ class Paint(NamedTuple):
     @property
     def constant(self) -> str | None:
         """What is said instead of a scale, where a number is the same in all cases."""
-        if self.names is not None or self.norm is None or self.norm.vmin != self.norm.vmax:
+        if self.names is not None or self.norm.vmin != self.norm.vmax:
             return None
         return f"{self.label}:\n{plain_number(self.norm.vmin or 0.0)} in all cases"
 
@@ -104,10 +93,7 @@ def coloured(data: xr.Dataset, value: str) -> tuple[xr.DataArray, bool]:
 def paint_of(shown: xr.DataArray, log: bool) -> Paint:
     """Return how values become colours: those of a flag or a period distinct ones, others of a scale.
 
-    Raises
-    ------
-    InputError
-        A logarithmic scale for what has none, or no value to show.
+    InputError of a logarithmic scale for what has none, or where there is no value to show.
     """
     if log and shown.name in CATEGORIES:
         raise InputError(f"map: {shown.name} has no scale; draw it without --log")
@@ -121,12 +107,12 @@ def categories(variable: str, codes: NDArray[np.integer]) -> dict[int, tuple[str
     present = [int(c) for c in np.unique(codes) if c >= 0]
     if variable == "period":
         # The short ones have colours of their own, the longer ones darken, and 0, none, is distinct.
-        longer = [c for c in present if c >= len(PERIOD_COLORS)]
+        longer = [c for c in present if c >= len(_PERIOD_COLORS)]
         ramp = matplotlib.colormaps["Greys"](np.linspace(0.45, 1.0, max(len(longer), 2)))
-        colors = {**dict(enumerate(PERIOD_COLORS)), **dict(zip(longer, ramp, strict=False))}
+        colors = {**dict(enumerate(_PERIOD_COLORS)), **dict(zip(longer, ramp, strict=False))}
         return {c: ("none" if c == 0 else f"P{c}", colors[c]) for c in present}
     meanings, palette = _FLAGS[variable]
-    return {c: (meanings[c], palette[c]) for c in present}
+    return {c: (in_words(meanings[c]), palette[c]) for c in present}
 
 
 def _scalar_paint(shown: xr.DataArray, log: bool) -> Paint:
@@ -139,7 +125,7 @@ def _scalar_paint(shown: xr.DataArray, log: bool) -> Paint:
         return np.ma.masked_less_equal(drawn, 0.0) if log else drawn
 
     everything = cells(shown.values)
-    if np.ma.masked_invalid(np.asarray(shown.values, dtype=float)).count() == 0:
+    if not np.isfinite(np.asarray(shown.values, dtype=float)).any():
         raise InputError(
             f"map: no selected case has a value of {shown.name}; run the study, or select other cases"
         )
@@ -158,15 +144,6 @@ def _category_paint(shown: xr.DataArray) -> Paint:
         return codes
 
     known = categories(str(shown.name), coded(shown.values))
-    if not known:
-        return Paint(
-            lambda values: np.ma.masked_where(coded(values) < 0, values),
-            None,
-            "Greys",
-            short_name(shown),
-            [],
-            [],
-        )
     present = list(known)
 
     def cells(values: NDArray[Any]) -> np.ma.MaskedArray[Any, Any]:
@@ -175,8 +152,8 @@ def _category_paint(shown: xr.DataArray) -> Paint:
 
     return Paint(
         cells,
-        Normalize(-0.5, len(present) - 0.5),
-        ListedColormap([color for _, color in known.values()]),
+        Normalize(-0.5, max(len(present), 1) - 0.5),
+        ListedColormap([color for _, color in known.values()] or ["white"]),
         short_name(shown),
         list(range(len(present))),
         [name for name, _ in known.values()],

@@ -44,8 +44,6 @@ def polar(
         A displacement or a probe [default: vertical].
     order
         Multiple of the spin speed; 1 is 1X.
-    over
-        Draw the cases along AXIS over one another.
     """
     signal = signal or default_signal(cases, "vertical")
     shown = order_over_speed(cases, (signal,), order, over)

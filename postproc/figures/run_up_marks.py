@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from postproc.store.rig_of_case import rig_axes, rig_of
+from rubhpc import units
 from rubhpc.rig.reading import rig_from_dict
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-RPM = 30.0 / math.pi
+RPM = units.RPM.factor
 APART = 0.085  # of the diagonal of a plot, between named speeds
 _BACK = 0.1  # of the way of a speed, up to which it may go back and counts as going one way
 _STEPS = 60  # of speed, on which modes are followed
@@ -93,10 +94,8 @@ def name_speeds(
 ) -> None:
     """Mark round speeds (of rad/s) along the first curve, with the rpm, where they are far enough apart.
 
-    That is `apart` times the diagonal of the plot.
-
-    Each is written where it covers least of curves and of other labels, those of the grid included, with a
-    leader where that is far.
+    That is `apart` times the diagonal of the plot. Each is written where it covers least, with a leader if
+    far.
     """
     x, y = curves[0]
     size = math.hypot(np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim()))

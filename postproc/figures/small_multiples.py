@@ -33,12 +33,7 @@ def overlaid(own: str, *data: xr.DataArray) -> list[tuple[Any, ...]]:
     """Return the cases to draw over one another: its name for a legend, of one case None, and its data.
 
     `own` is the dimension of a curve; another of the first data, if there is one, is the axis of the study to
-    spread over.
-
-    Raises
-    ------
-    InputError
-        There are more curves than can be distinguished.
+    spread over. InputError where there are more curves than can be distinguished.
     """
     first = data[0]
     over = next((d for d in first.dims if d != own), None)

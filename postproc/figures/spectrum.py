@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.figures.cascade_lines import ABSCISSA_LABELS, name_senses
 from postproc.figures.drawing import Drawing
-from postproc.figures.options import end_of_abscissa, spin_speed
+from postproc.figures.options import above_zero
 from postproc.figures.small_multiples import overlaid, write_over
 from postproc.signals.lines import SPIKE, spikes, strongest_lines
 from postproc.signals.places import signal_or_whirl
@@ -60,14 +60,6 @@ def spectrum(
         One case, or cases along the axis `over`.
     signal
         Which recorded signal [default: torsion].
-    full
-        Forward and backward whirl of the orbit instead of a signal.
-    probes
-        Names of two probes at one place, whose orbit is taken in place of the disc's.
-    node
-        Node of the rotor whose orbit is taken: the recorded one, or one with two probes.
-    stator
-        Number of a stator, at whose node the orbit is taken.
     at
         Spin speed of a run-up, such as "2000 rpm", around which a spectrum is taken over 32 revolutions,
         through Hann's window.
@@ -79,16 +71,14 @@ def spectrum(
         How many lines are named.
     log
         Amplitudes on a logarithmic scale.
-    over
-        Draw the cases along AXIS over one another.
     """
-    limit = end_of_abscissa(max, orders)
+    limit = above_zero(max, "" if orders else "Hz", "--max")
     cases, name = signal_or_whirl(cases, signal, "torsion", full, probes, node, stator)
-    if at is None:
+    speed = above_zero(at, "rad/s", "--at")
+    if speed is None:
         shown = spectrum_data(cases, name, over).compute()
         speed = float(narrow(cases, ["spin_speed"])["spin_speed"]) if over is None else None
     else:
-        speed = spin_speed(at, "--at")
         one = run_up_spectra(cases, name, _WINDOW, 1, speed).isel(place=0)
         shown = one["amplitude"].rename(name).drop_vars("revolution")
     abscissa = "order" if orders else "frequency"
@@ -112,18 +102,10 @@ def draw_spectrum(
     limit: float | None = None,
     log: bool = False,
 ) -> Axes:
-    """Draw a spectrum, or those of several cases over one another.
+    """Draw a spectrum ([over,] order), or those of several cases over one another.
 
-    Parameters
-    ----------
-    amplitude : ([over,] order)
-        Single-sided, or the full spectrum of the whirl; with the coordinate `frequency` unless drawn over
-        orders.
-    lines : Dataset, optional
-        From `strongest_lines`; each is named at its peak.
-    abscissa : {"frequency", "order"}
-    limit : float, optional
-        End of the abscissa, Hz or orders.
+    Each of `lines`, from `strongest_lines`, is named at its peak; `limit` is the end of the abscissa, Hz or
+    orders.
     """
     amplitude = amplitude.load()
     require_results(amplitude, amplitude.to_dataset())

@@ -34,8 +34,6 @@ def speed(cases: xr.Dataset, *, over: Axis | None = None) -> Drawing:
     ----------
     cases
         A study with [run_up] or [drive], all axes but `over` of one value, or selected.
-    over
-        Draw the cases along AXIS over one another.
     """
     shown = spin_over_time(cases, over)
     require_results(shown["speed"], cases)

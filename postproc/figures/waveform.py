@@ -7,7 +7,7 @@ from textwrap import fill
 from typing import TYPE_CHECKING
 
 from postproc.figures.drawing import Drawing
-from postproc.figures.options import spin_speed
+from postproc.figures.options import above_zero
 from postproc.figures.run_up_marks import title_of_speeds
 from postproc.figures.small_multiples import legend_below, overlaid
 from postproc.signals.contacts import runs_of
@@ -49,12 +49,10 @@ def waveform(
         The last ones, or those around the speed `at`.
     at
         Spin speed of a run-up, such as "2000 rpm".
-    over
-        Draw the cases along AXIS over one another.
     """
     named = (signal,) if isinstance(signal, str) else signal
     signals = tuple(dict.fromkeys(named)) or default_signals(cases)
-    speed = None if at is None else spin_speed(at, "--at")
+    speed = above_zero(at, "rad/s", "--at")
     shown = waveform_data(cases, signals, revolutions, over, speed)
     return Drawing(shown=shown, draw=lambda axes: draw_panels(shown, axes), panels=(len(signals), 1))
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from postproc.figures.drawing import Drawing
+from postproc.figures.run_up_marks import RPM
 from postproc.store.units import displayed, scale_of, written_value
 from rubhpc.fem.dry_whirl import NAMES
 from rubhpc.fem.whirl_balance import ROLLING, SLIPPING
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]
 
-_RPM = 30 / math.pi
 _MARKERS = {SLIPPING: "o", ROLLING: "^"}
 _DASHES: tuple[Any, ...] = ("-", (0, (4, 1.5)), (0, (1, 1.2)))
 _SAFE: dict[str, Any] = {"color": "0.92", "linewidth": 0}
@@ -39,11 +39,6 @@ def draw_whirl(found: xr.Dataset) -> Drawing:
     frequency at the end. On the right the frequencies of whirls at the frictions given, full where they are
     stable, or else those at which whirl begins. Of a single speed and clearance, one panel: the friction over
     the frequency.
-
-    Parameters
-    ----------
-    found : xarray.Dataset
-        From `rubhpc.dry_whirl`.
     """
     along = next((dim for dim in ("speed", "clearance") if found.sizes[dim] > 1), None)
     n_bore, n_column = found.sizes["stator"], 1 if along is None else 2
@@ -271,12 +266,12 @@ def _select(found: xr.Dataset, dim: str, i: int) -> xr.Dataset:
 
 def _abscissa(found: xr.Dataset, along: str) -> tuple[Floats, str]:
     if along == "speed":
-        return _RPM * found["speed"].values, "Spin speed (rpm)"
+        return RPM * found["speed"].values, "Spin speed (rpm)"
     return displayed(found["clearance"])
 
 
 def _places(some: xr.Dataset, dim: str, along: str) -> Floats:
-    factor = _RPM if along == "speed" else scale_of(some["clearance"]).factor
+    factor = RPM if along == "speed" else scale_of(some["clearance"]).factor
     return np.asarray(factor * some[f"{dim}_{along}"].values)
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from postproc.signals.contacts import runs_of
 from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
@@ -43,21 +44,11 @@ class Sampled(NamedTuple):
 def sampled(
     columns: Mapping[str, Floats], time: Floats | None, rate: float | None, where: str, name: str = ""
 ) -> Sampled:
-    """Return columns on a uniform grid of times.
+    """Return columns (n_sample,), NaN where a sample is missing, on a uniform grid of times.
 
-    Parameters
-    ----------
-    columns : mapping of name to (n_sample,)
-        NaN where a sample is missing.
-    time : (n_sample,), s, optional
-        Of each sample; without it `rate` (Hz) is needed.
-    where, name : str
-        The file and the column of the time, for messages.
-
-    Raises
-    ------
-    InputError
-        The time does not increase, a column has no numbers, or there are too few samples.
+    `time` (s) is that of each sample; without it the `rate` (Hz) is needed. File and column of the time are
+    named in messages: InputError where the time does not increase, a column has no numbers, or there are too
+    few samples.
     """
     n = min((values.size for values in columns.values()), default=0)
     if n < _FEWEST:
@@ -110,7 +101,7 @@ def _on_grid(
     off = float(apart[~in_gap].max(initial=0.0))
     is_even = off <= _UNEVEN * step or _is_rounded(time[known], off)
     if in_gap.any():
-        gaps = runs(in_gap)[0]
+        gaps = runs_of(in_gap)[0]
         notes.append(
             f"time: {int(in_gap.sum())} samples are missing in {gaps.size} gaps, up to "
             f"{step * _longest(in_gap):.3g} s in a row"
@@ -141,8 +132,7 @@ def _is_rounded(time: Floats, off: float) -> bool:
 def clipped(values: Floats) -> tuple[float, list[float]]:
     """Return the share of samples at which a signal is cut off, and at which of its highest and lowest value.
 
-    There are then far more samples at this value than at the one next to it, in runs: of a sine in steps of a
-    converter at most 2.4 times as many.
+    There are then far more samples at this value than at the one next to it, in runs.
     """
     share, levels = 0.0, []
     for sign in (1.0, -1.0):
@@ -157,13 +147,7 @@ def clipped(values: Floats) -> tuple[float, list[float]]:
     return share, levels
 
 
-def runs(flags: Flags) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return where the runs of true begin and end, half open."""
-    edges = np.flatnonzero(np.diff(np.pad(flags.astype(np.int8), 1)))
-    return edges[::2], edges[1::2]
-
-
 def _longest(flags: Flags) -> int:
     """Return the length of the longest run of true."""
-    first, end = runs(flags)
+    first, end = runs_of(flags)
     return int((end - first).max(initial=0))

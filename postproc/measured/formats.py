@@ -40,16 +40,9 @@ class Columns(NamedTuple):
 def read_columns(path: Path, names: Sequence[str]) -> Columns:
     """Return columns of a file by its extension, NaN where there is no number.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Of columns. In HDF5 and MATLAB files a path such as "run/y", or "run/y[2]" for one column of a matrix;
-        elsewhere the name in the heading, or the number of a column from 1.
-
-    Raises
-    ------
-    InputError
-        There is no such file, format or column, or it cannot be read; one line says what to do.
+    In HDF5 and MATLAB files a name is a path such as "run/y", or "run/y[2]" for one column of a matrix;
+    elsewhere that in the heading, or the number of a column from 1. InputError where there is no such file,
+    format or column, or it cannot be read.
     """
     kind = path.suffix.lower()
     if kind not in FORMATS:

@@ -219,13 +219,7 @@ def read_keys(path: Path) -> dict[str, Any]:
 
 
 def build_keys(tables: Mapping[str, Any], file: str) -> MeasuredKeys:
-    """Return the tables of a measured file, checked.
-
-    Raises
-    ------
-    InputError
-        A key is unknown or missing, or a value is invalid.
-    """
+    """Return the tables of a measured file; InputError of an unknown or missing key, or a bad value."""
     rest = {key: value for key, value in tables.items() if key != "signal"}
     if isinstance(rest.get("data"), str):
         rest["data"] = [rest["data"]]

@@ -8,15 +8,18 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from postproc.measured.clock import Sampled, clipped, runs, sampled
+from postproc.measured.clock import Sampled, clipped, sampled
 from postproc.measured.formats import read_columns
 from postproc.measured.keys import unit_factor
 from postproc.measured.shaft import Turning, at_constant_speed, by_key_phasor, by_speed_column
-from postproc.measured.tracking import by_angle
+from postproc.signals.contacts import runs_of
+from postproc.signals.resampling import between, decimated
 from rubhpc.errors import InputError
 from rubhpc.input.messages import place
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
     from postproc.measured.keys import MeasuredKeys, Signal
@@ -27,6 +30,7 @@ _ONE_SPEED = 0.02  # by which the speed of revolutions varies about their mean, 
 _SCATTER = 8  # revolutions over whose mean single pulses scatter little
 _GAP = 0.05  # of a revolution: more samples that are missing in a row cut the record
 _FEWEST = 4  # whole revolutions
+_ASIDE = 1  # revolutions on either side of those resampled at once, which the filter sees
 _START = 6  # revolutions of a run-up, whose mean position is 0 where no gap voltage is given
 _RPM = 30.0 / math.pi
 
@@ -52,10 +56,7 @@ class Record(NamedTuple):
 def read_record(keys: MeasuredKeys, path: Path) -> Record:
     """Return the record in a file, less its run-out where that is asked for.
 
-    Raises
-    ------
-    InputError
-        The file cannot be read, or has too few revolutions or pulses.
+    InputError where the file cannot be read, or has too few revolutions or pulses.
     """
     record = _tracked(keys, path)
     if keys.slow_roll is None:
@@ -116,7 +117,7 @@ def _tracked(keys: MeasuredKeys, path: Path) -> Record:
     )
     for signal in keys.signals:
         column = record.values[signal.column]
-        values = by_angle(column, record.step, turning, first + low, first + high, n)
+        values = _by_angle(column, record.step, turning, first + low, first + high, n)
         if not np.ptp(column):
             values[:] = column[0]  # without the rounding of the filter
         offset = signal.offset
@@ -161,10 +162,37 @@ def _longest_part(keys: MeasuredKeys, record: Sampled, begins: Floats) -> tuple[
     bad = np.zeros(begins.size - 1, dtype=bool)
     lasts = np.diff(begins)
     for column in {signal.column for signal in keys.signals}:
-        first, end = (at * record.step for at in runs(record.absent[column]))
+        first, end = (at * record.step for at in runs_of(record.absent[column]))
         held = [np.clip(np.searchsorted(begins, at) - 1, 0, bad.size - 1) for at in (first, end)]
         for is_long, start, stop in zip(end - first > _GAP * lasts[held[0]], *held, strict=True):
             if is_long:
                 bad[start : stop + 1] = True
-    parts = [(int(first), int(end)) for first, end in zip(*runs(~bad), strict=True)]
+    parts = [(int(first), int(end)) for first, end in zip(*runs_of(~bad), strict=True)]
     return max(parts, key=lambda part: part[1] - part[0], default=(0, 0))
+
+
+def _by_angle(values: Floats, step: float, turning: Turning, first: int, end: int, n: int) -> Floats:
+    """Return a signal at `n` uniform angles of each revolution from `first` up to `end`, whole ones.
+
+    Where the shaft turns so slowly that there are more samples in a revolution than `n`, orders beyond half
+    of `n` are filtered off. The values (n_sample,) are `step` seconds apart.
+    """
+    seen = between(values)
+    parts = []
+    for begin, stop, times in _blocks(step, turning, first, end, n):
+        wanted = np.arange((begin - _ASIDE) * n * times, (stop + _ASIDE) * n * times) / (n * times)
+        at = turning.time_at(np.clip(wanted, turning.first, turning.last))
+        fine = decimated(seen(at / step), times)
+        parts.append(fine[_ASIDE * n : (_ASIDE + stop - begin) * n])
+    return np.concatenate(parts)
+
+
+def _blocks(step: float, turning: Turning, first: int, end: int, n: int) -> Iterator[tuple[int, int, int]]:
+    """Yield the revolutions in whose samples `n` fit as many times, a power of two, and that number."""
+    lasts = np.diff(turning.time_at(np.arange(first, end + 1).astype(float)))
+    times = [2 ** max(0, math.ceil(math.log2(last / (step * n)))) for last in lasts.tolist()]
+    begin = 0
+    for i in range(1, len(times) + 1):
+        if i == len(times) or times[i] != times[begin]:
+            yield first + begin, first + i, times[begin]
+            begin = i

@@ -63,11 +63,7 @@ def by_key_phasor(values: Floats, step: float, keys: SpeedKeys, where: str) -> T
 
     Pulses that are missing or spurious are found by the intervals around them, and corrected. The time over
     the angle is a cubic spline that is as far from the pulses as a clock of `step` seconds places them.
-
-    Raises
-    ------
-    InputError
-        There are too few pulses, or too many are missing.
+    InputError where there are too few pulses, or too many are missing.
     """
     from scipy.interpolate import UnivariateSpline
 

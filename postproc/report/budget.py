@@ -37,12 +37,8 @@ def write_report(store: xr.Dataset, path: Path, limit: float) -> Load:
     """Write a self-contained page of at most `limit` bytes, and return its content.
 
     Measures come first, the most asked for before the others. Of the rest every case gets the same share:
-    as much detail as fits all of them, or, where the least detail does not, cases evenly spread.
-
-    Raises
-    ------
-    InputError
-        The limit is below what a page takes at least, or the file cannot be written.
+    as much detail as fits all of them, or, where the least detail does not, cases evenly spread. InputError
+    where the limit is below what a page takes at least, or the file cannot be written.
     """
     page = Page(store)
     # Room for the notes on what is left out.

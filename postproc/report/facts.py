@@ -12,17 +12,12 @@ import numpy as np
 from postproc.cases.maps import monitors
 from postproc.cases.sobol import drawn_ranges
 from postproc.report.grid import plain
-from postproc.store.attributes import table_of
+from postproc.store.attributes import KEYS, table_of
 from postproc.store.axes import axes_of, drawn_axes
 from postproc.store.rig_of_case import model_of
 from postproc.store.units import short_name
 from rubhpc.integrate.record import MOST_RESIDUAL
-from rubhpc.rig.probes import Probe
 from rubhpc.schema import DIVERGED, DONE, FAILED, INFERRED, MISSING, STATUS, VARIABLES, WAVEFORM
-from rubhpc.study.contact_keys import Contact
-from rubhpc.study.drive_keys import DriveKeys
-from rubhpc.study.run_up_keys import RunUpKeys
-from rubhpc.study.tables import Integrator, Recording
 from rubhpc.units import Scale, scale_for
 from rubhpc.validity import MONITORS
 
@@ -38,14 +33,6 @@ _MOST_FAILURES = 200  # listed, of each kind
 
 # The measure leaves the range of steady sliding only; the store's friction law covers it.
 _FOLLOWED = {"minimum_slip_speed": "no limit of the model; below 0 the rim slips back (Coulomb's law)"}
-_TABLES = {
-    "run_up": RunUpKeys,
-    "drive": DriveKeys,
-    "contact": Contact,
-    "integrator": Integrator,
-    "record": Recording,
-    "probe": Probe,
-}
 _OF_ONE_SPEED = ("transient", "transient_limit", "transient_tolerance", "revolutions")  # of [record]
 
 
@@ -229,13 +216,13 @@ def setting_rows(study: dict[str, Any]) -> list[tuple[str, str]]:
 def _text(table: str, settings: dict[str, Any]) -> str:
     units = {
         field.name: field.metadata.get("unit", field.metadata.get("units", ""))
-        for field in dataclasses.fields(_TABLES[table])
+        for field in dataclasses.fields(KEYS[table])
     }
     parts = []
     for key, value in settings.items():
         if value is None or value == []:
             continue
-        if key in _TABLES and isinstance(value, list):
+        if key in KEYS and isinstance(value, list):
             parts += [f"{key} ({_text(key, one)})" for one in value]
         else:
             parts.append(f"{key.replace('_', ' ')} {_value(value, units.get(key, ''))}")

@@ -10,7 +10,7 @@ import numpy as np
 
 from postproc.cases.maps import MAPPABLE, is_mappable, validity
 from postproc.figures.cells import cell_edges, is_geometric
-from postproc.figures.palette import categories
+from postproc.figures.palette import CATEGORIES, categories
 from postproc.store.attributes import table_of
 from postproc.store.axes import axes_of, drawn_axes
 from postproc.store.rig_of_case import unused_monitors
@@ -44,7 +44,6 @@ _FIRST = (
     "peak_to_peak_vertical",
     "peak_to_peak_horizontal",
 )
-_FLAGS = ("status", "regime", "period", "validity", "settled", "scheme", "record_end", "rub_kind")
 _WITHIN, *_BEYOND = ("#009E73", "#E69F00", "#56B4E9", "#CC79A7", "#F0E442", "#0072B2", "#D55E00", "#8C5A2B")
 _MOTION = ("peak_to_peak_vertical", "peak_to_peak_horizontal")
 # Measures of which all that is named has its unit.
@@ -131,7 +130,7 @@ class Measures:
                     "by_stator": self.is_by_stator(name),
                     "worst": worst_word(name),
                     "is_setting": self._is_setting(name),
-                    "is_flag": name in _FLAGS,
+                    "is_flag": name in (*CATEGORIES, "validity"),
                     "categories": self._categories(name),
                 }
             )
@@ -149,7 +148,7 @@ class Measures:
 
     def _categories(self, name: str) -> list[dict[str, Any]]:
         """Return code, name and colour of the values of a flag that occur; [] of what is no flag."""
-        if name not in _FLAGS:
+        if name not in (*CATEGORIES, "validity"):
             return []
         from matplotlib.colors import to_hex
 

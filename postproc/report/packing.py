@@ -110,25 +110,12 @@ def as_text(data: bytes) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class Detail:
-    """How much of a case is kept.
+    """How much of a case is kept, at most."""
 
-    Attributes
-    ----------
-    samples : int
-        A revolution, at most.
-    revolutions : int
-        Of the orbit of a motion without a period, at most; a periodic one needs no more than one period.
-    shown : int
-        Of the waveforms of such a motion, at most: more of them would overlap.
-    lines : int
-        Of a spectrum, at most.
-    signals : tuple of str
-    """
-
-    samples: int
-    revolutions: int
-    shown: int
-    lines: int
+    samples: int  # a revolution
+    revolutions: int  # of the orbit of a motion without a period; a periodic one needs one period
+    shown: int  # revolutions of the waveforms of such a motion: more of them would overlap
+    lines: int  # of a spectrum
     signals: tuple[str, ...]
 
     def text(self, kept: Collection[str]) -> str:

@@ -47,13 +47,7 @@ _SCRIPTS = ("data.js", "chart.js", "map.js", "panels.js", "page.js")
 
 
 class Page:
-    """A page on the current state of a store; `measures` and `cases` are what it shows.
-
-    Attributes
-    ----------
-    is_run_up : bool
-        Whether its cases change speed.
-    """
+    """A page on the current state of a store; `measures` and `cases` are what it shows."""
 
     def __init__(self, store: xr.Dataset) -> None:
         check_points(store)

@@ -13,9 +13,10 @@ import numpy as np
 
 from postproc.figures.bifurcation import bifurcation
 from postproc.figures.bode import bode
-from postproc.figures.drawing import house_style, new_figure
+from postproc.figures.drawing import Drawing, house_style, new_figure
 from postproc.figures.linear_design import campbell_diagram
 from postproc.figures.multipliers import multipliers
+from postproc.figures.run_up_marks import RPM
 from postproc.figures.speed import speed
 from postproc.figures.waterfall import waterfall
 from postproc.figures.whirl_chart import draw_whirl
@@ -34,33 +35,27 @@ from rubhpc.schema import AMPLITUDE, DONE, PROBE
 if TYPE_CHECKING:
     import xarray as xr
 
-    from postproc.figures.drawing import Drawing
-
 MOST_DRAWN = 6  # cases: a picture takes 50 kB
 _FEWEST, _WINDOW = 4, 32  # revolutions: of a Bode plot, of a spectrum
-_RPM = 30 / math.pi
 
 
-def picture(drawing: Drawing, *, is_shared: bool = False) -> str:
+def picture(drawing: Drawing, kind: str = "png", *, is_shared: bool = False) -> str:
     """Return a figure as an address that contains it; `is_shared`: its panels have one abscissa."""
     n_row, n_column = drawing.panels or (1, 1)
     content = io.BytesIO()
     with house_style():
         figure, axes = new_figure(n_row, drawing.height, drawing.width, n_column, is_shared=is_shared)
         drawing.draw(axes)
-        figure.savefig(content, format="png", dpi=110)
-    return "data:image/png;base64," + base64.b64encode(content.getvalue()).decode()
+        figure.savefig(content, format=kind, dpi=110, metadata={"Date": None} if kind == "svg" else None)
+    kind = kind.replace("svg", "svg+xml")
+    return f"data:image/{kind};base64,{base64.b64encode(content.getvalue()).decode()}"
 
 
 def branch_facts(store: xr.Dataset) -> dict[str, Any]:
     """Return what the page shows of branches.
 
-    Returns
-    -------
-    dict
-        `text`: how many points and branches there are, "" where the store has none; `cases`: of the first
-        cases `label`, the values of their axes, and `diagram` and `multipliers`, addresses that contain
-        pictures.
+    That is `text`: how many points and branches there are, "" where the store has none; `cases`: of the first
+    `label`, the values of their axes, and `diagram` and `multipliers`, addresses that contain pictures.
     """
     if not is_of_points(store) or not store.sizes["point"]:
         return {"text": "", "cases": []}
@@ -89,12 +84,8 @@ def branch_facts(store: xr.Dataset) -> dict[str, Any]:
 def run_up_facts(store: xr.Dataset) -> dict[str, Any]:
     """Return what the page shows of cases whose speed changes.
 
-    Returns
-    -------
-    dict
-        `text`: how many cases are drawn and of which signal, "" where the store has none; `cases`: of the
-        first that are done `label`, the values of their axes, and `pictures`: names and addresses that
-        contain them.
+    That is `text`: of which signal how many are drawn, "" where the store has none; `cases`: of the first
+    that are done `label`, the values of their axes, and `pictures`: names and addresses that contain them.
     """
     if not is_run_up(store) or "status" not in store:
         return {"text": "", "cases": []}
@@ -136,12 +127,9 @@ def _signal(store: xr.Dataset) -> str:
 def design_facts(store: xr.Dataset) -> dict[str, Any]:
     """Return what the page says of the rotor without contact, of the rig as the study states it.
 
-    Returns
-    -------
-    dict
-        `rows`: one for each critical speed, with `speed` (rpm), `whirl`, `damping` (%) and `excited`, as
-        text; `diagram`: the Campbell diagram as an address that contains its SVG; `text`: on stability, or
-        why there is no linear design.
+    That is `rows`: one for each critical speed, with `speed` (rpm), `whirl`, `damping` (%) and `excited`, as
+    text; `diagram`: the Campbell diagram, an address that contains it; `text`: on stability, or why there is
+    none.
     """
     try:
         return _facts(json.dumps(rig_of(store).as_dict(), sort_keys=True))
@@ -150,12 +138,9 @@ def design_facts(store: xr.Dataset) -> dict[str, Any]:
 
 
 def whirl_facts(store: xr.Dataset) -> dict[str, Any]:
-    """Return what the page says of dry whirl in bores, of the rig as the study states it.
+    """Return what the page says of dry whirl in the bores of the rig as the study states it.
 
-    Returns
-    -------
-    dict
-        `sentences`: one for each bore, none where the rig has no bore; `chart`: an address that contains it.
+    That is `sentences`, one for each bore, and `chart`: an address that contains it.
     """
     try:
         rig = rig_of(store)
@@ -196,28 +181,26 @@ def _facts(table: str) -> dict[str, Any]:
     columns = (design[f"critical_{name}"].values for name in ("speed", "whirl", "damping_ratio"))
     rows = [
         {
-            "speed": f"{_RPM * speed:.0f}",
+            "speed": f"{RPM * speed:.0f}",
             "whirl": str(whirl),
             "damping": f"{100 * damping:.3g}",
             "excited": "yes" if excited else "no",
         }
         for speed, whirl, damping, excited in zip(*columns, design["is_excited"].values, strict=True)
     ]
-    top = _RPM * float(design["speed"].values[-1])
-    threshold = _RPM * float(design["threshold_speed"])
+    top = RPM * float(design["speed"].values[-1])
+    threshold = RPM * float(design["threshold_speed"])
     stability = (
         f"stable up to {top:.0f} rpm, as far as the diagram goes"
         if math.isnan(threshold)
         else f"unstable from {threshold:.0f} rpm on"
     )
-    return {"rows": rows, "diagram": _diagram(design), "text": f"Without contact, the rotor is {stability}."}
-
-
-def _diagram(design: xr.Dataset) -> str:
-    limit = 1.5 * float(design["speed"].values[-1]) / (2 * math.pi)
-    content = io.BytesIO()
-    with house_style():
-        figure, (ax,) = new_figure(height=80, width=120)
-        campbell_diagram(design, ax, design["critical_speed"].values.tolist(), limit)
-        figure.savefig(content, format="svg", metadata={"Date": None})
-    return "data:image/svg+xml;base64," + base64.b64encode(content.getvalue()).decode()
+    critical, limit = design["critical_speed"].values.tolist(), 1.5 * top / 60.0
+    diagram = Drawing(
+        shown=design,
+        draw=lambda axes: campbell_diagram(design, axes[0], critical, limit),
+        height=80,
+        width=120,
+    )
+    text = f"Without contact, the rotor is {stability}."
+    return {"rows": rows, "diagram": picture(diagram, "svg"), "text": text}

@@ -89,6 +89,7 @@ def hold_peaks(spectra: xr.DataArray, limit: float, n_bin: int, abscissa: str = 
         spacing,
         input_core_dims=[["order"], []],
         output_core_dims=[["bin"]],
+        vectorize=True,
         dask="parallelized",
         output_dtypes=[float],
         kwargs={"edges": edges, "zero": int(np.argmin(np.abs(orders)))},
@@ -101,25 +102,18 @@ def hold_peaks(spectra: xr.DataArray, limit: float, n_bin: int, abscissa: str = 
 
 
 def _hold(
-    amplitude: NDArray[np.floating[Any]],
-    spacing: NDArray[np.float64],
-    edges: NDArray[np.float64],
-    zero: int,
+    amplitude: NDArray[np.floating[Any]], spacing: float, edges: NDArray[np.float64], zero: int
 ) -> NDArray[np.float64]:
-    """(n_row, n_line), (n_row,) -> (n_row, n_bin), the highest line of each bin; `zero` is order 0."""
-    n_line = amplitude.shape[-1]
-    held = np.full((amplitude.shape[0], edges.size - 1), np.nan)
+    """(n_line,) -> (n_bin,), the highest line of each bin; `zero` is order 0."""
     centre = (edges[1:] + edges[:-1]) / 2
-    for out, row, width in zip(
-        held, amplitude.astype(float), np.broadcast_to(spacing, len(held)), strict=True
-    ):
-        first = zero + np.ceil(edges / width - 1e-9).astype(int)
-        low, high = first[:-1], first[1:]
-        is_empty = high <= low
-        low = np.where(is_empty, zero + np.rint(centre / width).astype(int), low)
-        high = np.where(is_empty, low + 1, high)
-        is_inside = (low >= 0) & (low < n_line)
-        pairs = np.column_stack((low, np.minimum(high, n_line)))[is_inside]
-        # The floor past the end lets the last bin end at the last line.
-        out[is_inside] = np.maximum.reduceat(np.append(row, -np.inf), pairs.ravel())[::2]
+    first = zero + np.ceil(edges / spacing - 1e-9).astype(int)
+    low, high = first[:-1], first[1:]
+    is_empty = high <= low
+    low = np.where(is_empty, zero + np.rint(centre / spacing).astype(int), low)
+    high = np.where(is_empty, low + 1, high)
+    is_inside = (low >= 0) & (low < amplitude.size)
+    pairs = np.column_stack((low, np.minimum(high, amplitude.size)))[is_inside]
+    held = np.full(centre.size, np.nan)
+    # The floor past the end lets the last bin end at the last line.
+    held[is_inside] = np.maximum.reduceat(np.append(amplitude.astype(float), -np.inf), pairs.ravel())[::2]
     return held

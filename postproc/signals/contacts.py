@@ -10,10 +10,9 @@ import xarray as xr
 
 from postproc.signals.decay import decaying_sine
 from postproc.signals.spectra import check_signal, samples_per_revolution
-from postproc.store.axes import source
+from postproc.store.axes import refusal
 from postproc.store.select import narrow
 from postproc.store.variables import require_results
-from rubhpc.errors import InputError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -223,7 +222,7 @@ def _force(case: xr.Dataset, stator: int | None) -> xr.DataArray:
 def _place(case: xr.Dataset, stator: int) -> int:
     n_stator = case.sizes["stator"]
     if not 1 <= stator <= n_stator:
-        raise InputError(f"{source(case)}: there is no stator {stator}; choose one from 1 to {n_stator}")
+        raise refusal(case, f"there is no stator {stator}; choose one from 1 to {n_stator}")
     return stator - 1
 
 

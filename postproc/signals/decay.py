@@ -19,19 +19,12 @@ _FLOOR = 1e-3  # of the greatest singular value; below it is noise
 
 
 def decaying_sine(values: Floats, dt: float) -> dict[str, float]:
-    r"""Return the strongest decaying sine of a signal: `frequency`, `damping_ratio` and so on.
+    r"""Return the strongest decaying sine of a signal (n_sample,), from its start, `dt` seconds apart.
 
     The signal is modelled as $\sum_k c_k e^{s_k t}$. Its means over blocks of samples have the same poles
     with less noise; from them the matrix pencil (Y. Hua, T. K. Sarkar, IEEE Trans. ASSP 38 (1990) 814-824)
     finds $s_k$ as eigenvalues of one shifted Hankel matrix against another, both cut to the singular values
     above the noise. Amplitudes follow by least squares.
-
-    Parameters
-    ----------
-    values : (n_sample,)
-        From the start of the decay.
-    dt : float
-        Time between samples, s.
 
     Returns
     -------

@@ -33,21 +33,11 @@ _LEAST = 8  # samples of a span that can be sifted
 
 
 def empirical_modes(values: Floats, n_mode: int = 1) -> Floats:
-    """Return the first intrinsic mode functions of a signal, the fastest first.
+    """Return the first intrinsic modes of a signal (n_sample,), the fastest first, (n_mode, n_sample).
 
     Sifting stops when zeros and extrema have matched in number five times in a row (Huang and others, Proc.
-    R. Soc. Lond. A 459 (2003) 2317-2345), which does not depend on the unit of the signal.
-
-    Parameters
-    ----------
-    values : (n_sample,)
-    n_mode : int
-
-    Returns
-    -------
-    (n_mode, n_sample)
-        In the unit of the signal; zero where there are fewer modes. A signal of two extrema or less is a
-        trend and has none.
+    R. Soc. Lond. A 459 (2003) 2317-2345), which does not depend on the unit of the signal. There are zeros
+    where there are fewer modes: a signal of two extrema or less is a trend and has none.
     """
     from PyEMD import EMD
 
@@ -64,23 +54,12 @@ def empirical_modes(values: Floats, n_mode: int = 1) -> Floats:
 
 
 def analytic(mode: Floats, dt: float) -> tuple[Floats, Floats]:
-    """Return amplitude and instantaneous frequency of an intrinsic mode by the Hilbert transform.
+    """Return amplitude and instantaneous frequency (Hz) of an intrinsic mode by the Hilbert transform.
 
-    Only the part between its first and its last zero is returned: continued as an odd function there, the
-    mode stays smooth, and no edge effect leaks into a decayed part. At
-    most half a cycle is lost at either end.
-
-    Parameters
-    ----------
-    mode : (n_sample,)
-    dt : float
-        Time between samples, s.
-
-    Returns
-    -------
-    amplitude : (n_sample,)
-    frequency : (n_sample,), Hz
-        Forward difference of the phase, as in the paper; NaN outside the zeros, as is the amplitude.
+    Only the part between its first and its last zero has some, the rest NaN: continued as an odd function
+    there, the mode stays smooth, and no edge effect leaks into a decayed part. At most half a cycle is lost
+    at either end. The frequency is the forward difference of the phase, as in the paper. Mode and both
+    results are (n_sample,), `dt` seconds apart.
     """
     from scipy.signal import hilbert
 
@@ -224,18 +203,10 @@ def contact_bandwidth(hht: xr.Dataset, mode: int = 1) -> xr.Dataset:
 def energy_picture(
     hht: xr.Dataset, limit: float, n_frequency: int = 100, n_time: int = 400, mode: int = 1
 ) -> xr.DataArray:
-    """Return the energy of a mode over frequency and time, (frequency, time): its Hilbert spectrum.
+    """Return the energy of a mode over frequency, up to `limit` Hz, and time: its Hilbert spectrum.
 
-    Parameters
-    ----------
-    limit : float
-        End of the frequencies, Hz.
-
-    Returns
-    -------
-    (frequency, time)
-        Mean squared amplitude of the samples in a bin of time whose frequency falls into a bin of frequency,
-        in the signal's unit squared.
+    That is (frequency, time), the mean squared amplitude of the samples in a bin of time whose frequency
+    falls into a bin of frequency, in the signal's unit squared.
     """
     one = hht.sel(mode=mode)
     time = one["time"].values
@@ -272,9 +243,10 @@ def _quantiles(one: xr.Dataset, inside: NDArray[np.bool_], shares: tuple[float, 
     """Return amplitude-weighted quantiles of the frequency over some samples, Hz."""
     frequency, amplitude = one["frequency"].values, one["amplitude"].values
     inside = inside & np.isfinite(frequency) & (amplitude > 0)
-    order = np.argsort(frequency[inside], kind="stable")
-    if order.size == 0:
+    if not inside.any():
         return [math.nan] * len(shares)
-    total = np.cumsum(amplitude[inside][order])
-    places = np.searchsorted(total, np.asarray(shares) * total[-1])
-    return [float(f) for f in frequency[inside][order][places]]
+    weights = amplitude[inside]
+    found: list[float] = np.quantile(
+        frequency[inside], shares, weights=weights, method="inverted_cdf"
+    ).tolist()
+    return found

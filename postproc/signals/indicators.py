@@ -15,7 +15,7 @@ import xarray as xr
 
 from postproc.signals.sensors import Sensor
 from postproc.signals.spectra import samples_per_revolution
-from postproc.store.axes import axes_of, source
+from postproc.store.axes import axes_of, refusal, source
 from postproc.store.rig_of_case import natural_frequencies, rig_axes, stator_frequencies
 from postproc.store.select import narrow
 from postproc.store.variables import require_results
@@ -63,8 +63,7 @@ def indicator_scores(
     Noise of level 1 is, in each channel, white Gaussian noise whose rms in 1 kHz is that channel's median
     vibration over the cases that touch, and, as strong again, benign harmonics: random 1X, 2X and 3X such as
     misalignment or a drive bring in (`sensors.Sensor`). A case's draws depend on `seed` and its place in the
-    study only, and are the same
-    at all levels.
+    study only, and are the same at all levels.
 
     Parameters
     ----------
@@ -106,7 +105,7 @@ def indicator_scores(
         (free, "stays free of contact", "take clearances above the contact-free amplitude"),
     ):
         if not mask.any():
-            raise InputError(f"{source(store)}: no selected case {kind}; {fix} into the study")
+            raise refusal(store, f"no selected case {kind}; {fix} into the study")
     n = samples_per_revolution(data[CHANNELS[0]])
     n_turn = data.sizes["sample"] // n
     data = data.isel(sample=slice(-n * (n_turn // _WHOLE * _WHOLE or n_turn), None))
@@ -114,9 +113,10 @@ def indicator_scores(
     highest = (1 + _BAND) * frequencies["stator"] / (data["spin_speed"] / (2 * math.pi))
     if float(highest.max()) >= n / 2:
         least = math.ceil(2 * float(highest.max())) + 1
-        raise InputError(
-            f"{source(store)}: {n} samples a revolution do not resolve the stator's vibration at the lowest "
-            f"speed; use at least {least}, or select faster cases"
+        raise refusal(
+            store,
+            f"{n} samples a revolution do not resolve the stator's vibration at the lowest "
+            f"speed; use at least {least}, or select faster cases",
         )
     reference = [float(rms_about_mean(data[name]).where(rub).median()) for name in CHANNELS]
     waves = [data[name] for name in CHANNELS]
@@ -127,7 +127,7 @@ def indicator_scores(
     if data[CHANNELS[0]].chunks is not None:  # blocks of cases as they lie on disk, each with whole records
         place = place.chunk({d: data[CHANNELS[0]].chunksizes[d] for d in axes})
     found: xr.DataArray = xr.apply_ufunc(
-        _block,
+        _of_case,
         *waves,
         place,
         data["spin_speed"],
@@ -135,6 +135,7 @@ def indicator_scores(
         frequencies["stator"],
         input_core_dims=[*[["sample"]] * 3, ["stator", "sample"], *[[]] * 3, ["stator"]],
         output_core_dims=[["indicator", "level", "draw"]],
+        vectorize=True,
         dask="parallelized",
         output_dtypes=[float],
         kwargs={"n": n, "reference": reference, "noise": noise},
@@ -162,13 +163,13 @@ def _natural(data: xr.Dataset) -> dict[str, xr.DataArray]:
     keys = [data[key] for key in rig_axes(data) if key in data.coords]
     along = list(dict.fromkeys(str(dim) for key in keys if key.size > 1 for dim in key.dims))
     if len(along) > 1:
-        raise InputError(f"{source(data)}: select one value of {' or of '.join(along)}")
+        raise refusal(data, f"select one value of {' or of '.join(along)}")
     axis = along[0] if along else None
     rotor = natural_frequencies(data, axis)
     each = [data.isel(stator=i) for i in range(data.sizes["stator"])] if "stator" in data.dims else [data]
     stators = [stator_frequencies(case, axis) for case in each]
     if "torsional" not in rotor or any("lateral" not in stator for stator in stators):
-        raise InputError(f"{source(data)}: no natural frequency of torsion or stator; use another rig")
+        raise refusal(data, "no natural frequency of torsion or stator; use another rig")
     lateral = [stator["lateral"] for stator in stators]
     stator = xr.concat(lateral, "stator") if "stator" in data.dims else lateral[0]
     return {"torsion": rotor["torsional"], "stator": stator}
@@ -181,67 +182,51 @@ def rms_about_mean(wave: xr.DataArray) -> xr.DataArray:
     return rms.max([d for d in ("stator",) if d in wave.dims]).compute()
 
 
-def _block(
+def _of_case(
     vertical: NDArray[np.floating[Any]],
     horizontal: NDArray[np.floating[Any]],
     torsion: NDArray[np.floating[Any]],
     lateral: NDArray[np.floating[Any]],
-    place: NDArray[np.int64],
-    spin: Floats,
-    torsion_frequency: Floats,
+    place: int,
+    spin: float,
+    torsion_frequency: float,
     stator_frequency: Floats,
     *,
     n: int,
     reference: Sequence[float],
     noise: Noise,
 ) -> Floats:
-    """One block of cases: (..., n_indicator, n_level, n_draw).
-
-    Waves are (..., n_sample), `lateral` (..., n_stator, n_sample), `stator_frequency` (..., n_stator), the
-    rest (...).
-    """
-    shape = np.broadcast_shapes(place.shape, spin.shape, torsion.shape[:-1])
-    n_sample = torsion.shape[-1]
-    n_turn = n_sample // n
-    whirl = np.fft.fft(vertical + 1j * horizontal.astype(float), axis=-1) / n_sample
-    twist = np.fft.rfft(torsion.astype(float), axis=-1) * (math.sqrt(2) / n_sample)
-    shake = np.fft.rfft(lateral.astype(float), axis=-1) * (math.sqrt(2) / n_sample)
-    rate = spin / (2 * math.pi)
-    n_stator = lateral.shape[-2]
-    twist_order = np.broadcast_to(torsion_frequency / rate, shape)
-    shake_order = np.broadcast_to(stator_frequency / rate[..., None], (*shape, n_stator))
-    places, rates = np.broadcast_to(place, shape), np.broadcast_to(rate, shape)
-    whirl, twist = (np.broadcast_to(a, (*shape, a.shape[-1])) for a in (whirl, twist))
-    shake = np.broadcast_to(shake, (*shape, *shake.shape[-2:]))
-    out = np.full((*shape, len(INDICATORS), noise.levels.size, noise.n_draw), math.nan)
+    """Indicators of one case, (n_indicator, n_level, n_draw); `lateral` is (n_stator, n_sample)."""
+    if not np.isfinite(torsion).all():
+        return np.full((len(INDICATORS), noise.levels.size, noise.n_draw), math.nan)
+    n_sample, n_turn, rate = torsion.size, torsion.size // n, float(spin) / (2 * math.pi)
+    spacing = rate / n_turn  # Hz from line to line
+    rng = np.random.default_rng([noise.seed, int(place)])
     turns = np.arange(n_sample) / n
-    for i in np.ndindex(*shape):
-        if not np.isfinite(twist[i][0]):
-            continue
-        rng = np.random.default_rng([noise.seed, int(places[i])])
-        spacing = float(rates[i]) / n_turn  # Hz from line to line
-        sizes = [*reference, *[reference[-1]] * (n_stator - 1)]
-        added = [_noise(turns, n * float(rates[i]), size, noise.n_draw, rng) for size in sizes]
-        orbit = np.fft.fft(added[0] + 1j * added[1], axis=-1) / n_sample
-        twists, *shakes = (np.fft.rfft(one, axis=-1) * (math.sqrt(2) / n_sample) for one in added[2:])
-        channels = [
-            (whirl[i], orbit, _whirl_lines(n_turn, n_sample)),
-            (twist[i], twists, _twist_lines(float(twist_order[i]), n_turn)),
-            *(
-                (shake[i][k], shakes[k], _band_lines(float(shake_order[i][k]), n_turn))
-                for k in range(n_stator)
-            ),
-        ]
-        whirling, twisting, *shaking = (
-            lines[at] + noise.levels[:, None, None] * one[:, at] for lines, one, at in channels
-        )
-        out[i] = [
+    sizes = [*reference, *[reference[-1]] * (len(lateral) - 1)]
+    added = [_noise(turns, n * rate, size, noise.n_draw, rng) for size in sizes]
+
+    def lines_of(wave: NDArray[Any], drawn: Floats, at: NDArray[np.intp]) -> Lines:
+        """Lines of a wave under noise, (n_level, n_draw, n_line): two-sided of a complex one."""
+        fft, unit = (np.fft.fft, 1.0) if np.iscomplexobj(wave) else (np.fft.rfft, math.sqrt(2))
+        own, other = (fft(one, axis=-1)[..., at] * (unit / n_sample) for one in (wave, drawn))
+        return np.asarray(own + noise.levels[:, None, None] * other)
+
+    whirl = vertical + 1j * horizontal.astype(float)
+    whirling = lines_of(whirl, added[0] + 1j * added[1], _whirl_lines(n_turn, n_sample))
+    twisting = lines_of(torsion.astype(float), added[2], _twist_lines(torsion_frequency / rate, n_turn))
+    shaking = [
+        lines_of(wave.astype(float), drawn, _band_lines(frequency / rate, n_turn))
+        for wave, drawn, frequency in zip(lateral, added[3:], stator_frequency, strict=True)
+    ]
+    return np.array(
+        [
             _decibels(_power(twisting) / spacing),
             _decibels(_power(whirling) / spacing),
             np.max([_decibels(_power(band)) for band in shaking], axis=0),
             np.max([_burst_level(band, n_turn) for band in shaking], axis=0),
         ]
-    return out
+    )
 
 
 def _noise(turns: Floats, rate: float, size: float, n_draw: int, rng: np.random.Generator) -> Floats:

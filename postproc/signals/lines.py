@@ -38,13 +38,6 @@ def sine_order(order: NDArray[np.float64], amplitude: NDArray[np.float64], peak:
 
     The line of a sine falls with one over its distance, so that the peak and its higher neighbour, of
     amplitudes A and B, lie to both sides of it, at distances as B to A.
-
-    Parameters
-    ----------
-    order, amplitude : (n,)
-        Of all lines, evenly spaced.
-    peak : int
-        Index of a local maximum.
     """
     beside = [i for i in (peak - 1, peak + 1) if 0 <= i < len(order)]
     higher = max(beside, key=lambda i: float(amplitude[i]))

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from postproc.signals.spectra import check_signal, samples_per_revolution
-from postproc.store.axes import axes_of, find_axis, source
+from postproc.store.axes import axes_of, find_axis, refusal
 from postproc.store.run_ups import is_run_up
 from postproc.store.select import narrow
 from rubhpc.errors import InputError
@@ -41,7 +41,6 @@ def order_over_speed(
     store : Dataset
         Of `rubhpc.run_up`, a store of run-ups, or one with an axis of speeds and waveforms, in which axes but
         this and `over` have been selected.
-    signals : sequence of str
     order : float
         Multiple of the spin frequency.
     over : str, optional
@@ -64,14 +63,10 @@ def order_over_speed(
     """
     for signal in signals:
         check_signal(signal, store)
-    found = (
-        _of_run_up(store, signals, order, over)
-        if is_run_up(store)
-        else _of_cases(store, signals, order, over)
-    )
-    along = "revolution" if is_run_up(store) else "speed"
-    if along == "speed":
-        found = found.sortby("speed")
+    if is_run_up(store):
+        along, found = "revolution", _of_run_up(store, signals, order, over)
+    else:
+        along, found = "speed", _of_cases(store, signals, order, over).sortby("speed")
     for signal in signals:
         phase, size = found[f"phase_{signal}"], found[f"amplitude_{signal}"].values
         silent = max(SILENT * float(np.nanmax(size, initial=0.0)), NOTHING)
@@ -79,27 +74,18 @@ def order_over_speed(
         if along == "revolution":
             values = np.apply_along_axis(_without_jumps, phase.get_axis_num(along), values)
         unwrapped = np.apply_along_axis(_unwrap, phase.get_axis_num(along), values)
-        found[f"phase_{signal}"] = phase.copy(
-            data=unwrapped - 2 * np.pi * round(_mean(unwrapped) / (2 * np.pi))
-        )
+        known = unwrapped[np.isfinite(unwrapped)]
+        turns = round(float(known.mean()) / (2 * np.pi)) if known.size else 0
+        found[f"phase_{signal}"] = phase.copy(data=unwrapped - 2 * np.pi * turns)
     found["speed"].attrs |= {"units": "rad s-1", "long_name": "spin speed"}
     return found
 
 
 def written_lag(lead: Floats, speed: Floats, before: tuple[Floats, Floats] | None = None) -> Floats:
-    """Return the lag of a phase, degrees, less whole turns.
+    """Return the lag, degrees, of a phase that leads (n,), rad, less whole turns.
 
-    From one stretch of known phase to the next these are unknown.
-
-    Parameters
-    ----------
-    lead : (n,)
-        rad; NaN where there is none.
-    speed : (n,)
-        Of the shaft.
-    before : tuple of (m,), optional
-        Speed and lag of the curve drawn before, near which each stretch is drawn. Without it the lag at the
-        lowest speed is from -60 to 300 degrees.
+    From one stretch of known phase to the next these are unknown: each stretch is drawn near the curve drawn
+    `before`, of which speed and lag are given. Without one the lag at the lowest speed is from -60 to 300.
     """
     lag = -np.degrees(lead)
     known = np.flatnonzero(np.isfinite(lag) & np.isfinite(speed))
@@ -133,11 +119,6 @@ def _without_jumps(phase: Floats) -> Floats:
     return np.where(near > 0.5, np.nan, phase)
 
 
-def _mean(values: Floats) -> float:
-    finite = values[np.isfinite(values)]
-    return float(finite.mean()) if finite.size else 0.0
-
-
 def _of_run_up(store: xr.Dataset, signals: Sequence[str], order: float, over: str | None) -> xr.Dataset:
     near = np.flatnonzero(np.abs(store["order"].values - order) < NEAR)
     if not near.size:
@@ -151,10 +132,8 @@ def _of_run_up(store: xr.Dataset, signals: Sequence[str], order: float, over: st
             )
             raise InputError(f"{name.split('_', 1)[1]}: no order of it is followed; choose one of {known}")
     store, others = _with_contact(store, ["revolution_contact_fraction", "contact_fraction"])
-    others = ["speed", *others]
-    if "status" in store:
-        store = narrow(store, [*names, *others], [find_axis(store, over)] if over else [])
-    rows = store[[*names, *others]].isel(order=int(near[0]))
+    store = narrow(store, [*names, "speed", *others], [find_axis(store, over)] if over else [])
+    rows = store.isel(order=int(near[0]))
     rows = rows.drop_vars(["order", "stator"], errors="ignore").load()
     turn, last = np.arange(rows.sizes["revolution"]), rows["speed"].notnull().sum("revolution")
     within = xr.DataArray(turn, dims="revolution")
@@ -174,7 +153,7 @@ def _with_contact(store: xr.Dataset, names: Sequence[str]) -> tuple[xr.Dataset, 
 def _of_cases(store: xr.Dataset, signals: Sequence[str], order: float, over: str | None) -> xr.Dataset:
     along = next((axis for axis in axes_of(store) if axis in SPEED_AXES), None)
     if along is None or store.sizes[along] < 2:
-        raise InputError(f"{source(store)}: bode needs an axis of several speeds; give another store")
+        raise refusal(store, "bode needs an axis of several speeds; give another store")
     spread = [along, *([find_axis(store, over)] if over else [])]
     store, touched = _with_contact(store, ["contact_fraction"])
     data = narrow(store, [*signals, *touched, "spin_speed"], spread).load()
@@ -184,7 +163,7 @@ def _of_cases(store: xr.Dataset, signals: Sequence[str], order: float, over: str
         turns = data.sizes["sample"] // n
         if abs(turns * order - round(turns * order)) > WHOLE:
             problem = f"{turns} revolutions hold no whole number of periods of order {order:g}"
-            raise InputError(f"{source(store)}: {problem}; record a multiple of its period")
+            raise refusal(store, f"{problem}; record a multiple of its period")
         dims = [dim for dim in data[signal].dims if dim != "sample"]
         rows = data[signal].transpose(*dims, "sample").values.astype(float)
         turning = np.exp(-2j * np.pi * order / n * np.arange(rows.shape[-1]))
@@ -195,7 +174,7 @@ def _of_cases(store: xr.Dataset, signals: Sequence[str], order: float, over: str
     speed = data["spin_speed"]
     if speed.dims != (along,):
         problem = f"the speeds depend on {', '.join(str(d) for d in speed.dims if d != along)} too"
-        raise InputError(f"{source(store)}: {problem}; select one value of it")
+        raise refusal(store, f"{problem}; select one value of it")
     coords = {name: at for name, at in data.coords.items() if "sample" not in at.dims and name != "speed"}
     found = xr.Dataset(variables, coords=coords)
     found = found.assign_coords(speed=(along, speed.values))

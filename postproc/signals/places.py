@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from postproc.signals.spectra import WHIRL, default_signal
 from postproc.store.attributes import MEASURED
-from postproc.store.axes import source
+from postproc.store.axes import refusal
 from postproc.store.rig_of_case import has_place, recorded_node, rig_of
 from postproc.store.variables import probe_of, probes_of, require_variables
 from rubhpc.errors import InputError
@@ -82,7 +82,7 @@ def moved_at(
         stators = rig_of(store).stator
         if not 1 <= stator <= len(stators):
             known = f"1 to {len(stators)}" if len(stators) > 1 else "1"
-            raise InputError(f"{source(store)}: stator: there is no {stator}; give {known}")
+            raise refusal(store, f"stator: there is no {stator}; give {known}")
         node = stators[stator - 1].node
     if probes is not None:
         return seen_by_two(store, *_pair(store, probes))
@@ -95,7 +95,7 @@ def moved_at(
         return seen_by_two(store, *pairs[node])
     known = ", ".join(str(n) for n in sorted({*recorded_nodes, *pairs}))
     fix = f"choose one of {known}, or record two displacement probes at it" if known else "leave it out"
-    raise InputError(f"{source(store)}: node {node}: its motion is not recorded; {fix}")
+    raise refusal(store, f"node {node}: its motion is not recorded; {fix}")
 
 
 def signal_or_whirl(
@@ -109,10 +109,7 @@ def signal_or_whirl(
 ) -> tuple[xr.Dataset, str]:
     """Return what a spectrum is of: the store and a signal, or for a full spectrum the whirl at a place.
 
-    Raises
-    ------
-    InputError
-        A signal and a full spectrum, a place without one, or no motion of the place.
+    InputError of a signal with a full spectrum, a place without one, or a motion that is not recorded.
     """
     if not full:
         given = {"--probes": probes, "--node": node, "--stator": stator}
@@ -156,22 +153,18 @@ def seen_by_two(store: xr.Dataset, first: dict[str, Any], second: dict[str, Any]
 def _pair(store: xr.Dataset, probes: tuple[str, str]) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return two probes by name; InputError where they do not give a motion."""
     if isinstance(probes, str) or len(probes) != 2:
-        raise InputError(f"{source(store)}: probes: {probes}: give the names of two probes at one place")
+        raise refusal(store, f"probes: {probes}: give the names of two probes at one place")
     first, second = (probe_of(store, name) for name in probes)
     for probe in (first, second):
         if probe["quantity"] not in ("displacement", "velocity", "acceleration"):
             problem = f"measures {probe['quantity'].replace('_', ' ')}, which has no orbit"
-            raise InputError(
-                f"{source(store)}: probe {probe['name']}: {problem}; choose one of a displacement"
-            )
+            raise refusal(store, f"probe {probe['name']}: {problem}; choose one of a displacement")
     names = f"{first['name']} and {second['name']}"
     for key in ("quantity", "node", "stator"):
         if first.get(key) != second.get(key):
-            raise InputError(
-                f"{source(store)}: probes {names}: differ in their {key}; choose two at one place"
-            )
+            raise refusal(store, f"probes {names}: differ in their {key}; choose two at one place")
     if not _sine(first, second):
-        raise InputError(f"{source(store)}: probes {names}: look in one direction; choose two that do not")
+        raise refusal(store, f"probes {names}: look in one direction; choose two that do not")
     return first, second
 
 

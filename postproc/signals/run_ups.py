@@ -8,13 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from postproc.signals.spectra import WHIRL, check_signal
-from postproc.store.axes import find_axis, source
+from postproc.signals.spectra import WHIRL, check_signal, samples_per_revolution
+from postproc.store.axes import find_axis, refusal
 from postproc.store.run_ups import first_around, is_run_up
 from postproc.store.select import narrow
-from postproc.store.variables import require_variables
-from rubhpc.errors import InputError
-from rubhpc.schema import TURNED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,15 +31,10 @@ def run_up_spectra(
 ) -> xr.Dataset:
     """Return amplitude spectra of a run-up at `count` places, each over `window` revolutions, loaded.
 
-    A window is at most half of the run-up, but for one of less than twice `FEWEST` revolutions.
-
-    Windows are Hann's: a line of a steady amplitude has its height, zero to peak. Those of the "whirl" are
-    full spectra, as of `full_spectrum`.
-
-    Parameters
-    ----------
-    at : float, optional
-        rad/s; the one spectrum around this speed, where it is first reached, in place of `count`.
+    A window is at most half of the run-up, but for one of less than twice `FEWEST` revolutions. Windows are
+    Hann's: a line of a steady amplitude has its height, zero to peak. Those of the "whirl" are full spectra,
+    as of `full_spectrum`. With a speed `at`, rad/s, there is the one spectrum around it, where it is first
+    reached.
 
     Returns
     -------
@@ -59,7 +51,7 @@ def run_up_spectra(
     data, per_revolution, n = _case(store, ["vertical", "horizontal"] if is_full else [signal])
     if n <= FEWEST:
         problem = f"this run-up has {n} revolutions, too few for spectra over its speed"
-        raise InputError(f"{source(store)}: {problem}; draw it with rubhpc waveform")
+        raise refusal(store, f"{problem}; draw it with rubhpc waveform")
     window = min(window, max(n // 2, FEWEST))
     speed = data["speed"].values[:n]
     starts = np.unique(np.linspace(0, n - window, count).round().astype(int))
@@ -126,16 +118,12 @@ def _case(store: xr.Dataset, signals: Sequence[str]) -> tuple[xr.Dataset, int, i
     for signal in signals:
         check_signal(signal, store)
     if not is_run_up(store):
-        raise InputError(
-            f"{source(store)}: its speed is constant; give a run-up, as of a study with [run_up]"
-        )
-    require_variables(store, signals)
-    data = (narrow(store, [*signals, "speed"]) if "status" in store else store[[*signals, "speed"]]).load()
-    per_revolution = round(1.0 / float(data[TURNED][1] - data[TURNED][0]))
+        raise refusal(store, "its speed is constant; give a run-up, as of a study with [run_up]")
+    data = narrow(store, [*signals, "speed"]).load()
     n = int(np.isfinite(data["speed"].values).sum())
     if not n:
-        raise InputError(f"{source(store)}: this run-up has no whole revolution; select another case")
-    return data, per_revolution, n
+        raise refusal(store, "this run-up has no whole revolution; select another case")
+    return data, samples_per_revolution(data), n
 
 
 def spin_over_time(store: xr.Dataset, over: str | None = None) -> xr.Dataset:
@@ -146,8 +134,6 @@ def spin_over_time(store: xr.Dataset, over: str | None = None) -> xr.Dataset:
     store : Dataset
         Of `rubhpc.run_up`, or a store of run-ups or driven rotors in which axes but `over` have been
         selected.
-    over : str, optional
-        An axis along which the cases are to be kept.
 
     Returns
     -------
@@ -161,13 +147,12 @@ def spin_over_time(store: xr.Dataset, over: str | None = None) -> xr.Dataset:
         The speed is constant, or several cases are left.
     """
     if not is_run_up(store):
-        raise InputError(f"{source(store)}: its speeds are constant; give a store with [run_up] or [drive]")
+        raise refusal(store, "its speeds are constant; give a store with [run_up] or [drive]")
     prefix = _PREFIX if _PREFIX + _TORQUES[1] in store else ""
     is_driven = prefix + _TORQUES[1] in store
     names = ["speed", "time", *([prefix + name for name in _TORQUES] if is_driven else [])]
-    if "status" in store:
-        store = narrow(store, names, [find_axis(store, over)] if over else [])
-    found = store[names].drop_vars(["order", "stator"], errors="ignore").load()
+    store = narrow(store, names, [find_axis(store, over)] if over else [])
+    found = store.drop_vars(["order", "stator"], errors="ignore").load()
     shown = found[["speed"]]
     shown["time"] = found["time"] + math.pi / found["speed"]
     shown["time"].attrs |= {"units": "s", "long_name": "time, in the middle of the revolution"}

@@ -26,12 +26,8 @@ _REACH = 4  # samples to either side
 def section_of(store: xr.Dataset, signal: str) -> xr.DataArray:
     """Return the section of a signal: the stored one, or else every sample at a whole revolution; lazy.
 
-    Velocities ("vertical_velocity") are taken from the waveform.
-
-    Raises
-    ------
-    InputError
-        The signal is unknown, or neither its section nor its waveform is stored.
+    Velocities ("vertical_velocity") are taken from the waveform. InputError where the signal is unknown, or
+    neither its section nor its waveform is stored.
     """
     if signal in VELOCITIES:
         require_variables(store, [VELOCITIES[signal], "spin_speed"])
@@ -58,10 +54,7 @@ def section_data(store: xr.Dataset, signals: Sequence[str]) -> xr.Dataset:
 def sections_along(store: xr.Dataset, signal: str, along: str, over: str | None = None) -> xr.Dataset:
     """Return the section of a signal with regime, period and status, over ([over,] along, section); lazy.
 
-    Raises
-    ------
-    InputError
-        Other axes than these have several values, or the store keeps neither section nor waveform.
+    InputError where other axes have several values, or the store keeps neither section nor waveform.
     """
     name = f"section_{signal}"
     store = store.assign({name: section_of(store, signal)})
@@ -71,23 +64,12 @@ def sections_along(store: xr.Dataset, signal: str, along: str, over: str | None 
 
 
 def section_velocity(waveform: xr.DataArray, spin_speed: xr.DataArray) -> xr.DataArray:
-    """Return the time derivative of a signal at every whole revolution, in its unit per second; lazy.
+    """Return the time derivative of a signal (..., sample) at every whole revolution, (..., section); lazy.
 
-    It is that of the polynomial of degree 8 through the sample and four on either side; NaN at the first
-    sample, before which there is none. Unlike the derivative of a Fourier series, it needs no whole periods.
-    The relative error at order `k` is about `(2 pi k / n)^8 / 630` of `n` samples a revolution: 2e-9 at 4X of
-    256.
-
-    Parameters
-    ----------
-    waveform : (..., sample)
-        Whole revolutions, with the coordinate `revolution`.
-    spin_speed : (...)
-        rad/s
-
-    Returns
-    -------
-    (..., section)
+    In the unit of the signal per second, at spin speeds (...), rad/s. It is that of the polynomial of degree
+    8 through the sample and four on either side; NaN at the first sample, before which there is none. Unlike
+    the derivative of a Fourier series, it needs no whole periods. The relative error at order `k` is about
+    `(2 pi k / n)^8 / 630` of `n` samples a revolution: 2e-9 at 4X of 256.
     """
     n = samples_per_revolution(waveform)
     near = np.arange(-_REACH, _REACH + 1)

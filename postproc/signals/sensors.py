@@ -16,7 +16,6 @@ from postproc.signals.spectra import check_signal, samples_per_revolution
 from postproc.store.run_ups import is_run_up
 from postproc.store.select import narrow
 from rubhpc.errors import InputError
-from rubhpc.schema import TURNED
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -170,14 +169,7 @@ def sense(
 
 
 class Clock:
-    """The clock of a data logger during one case.
-
-    Parameters
-    ----------
-    case : Dataset
-        As of `sense`.
-    rate : float
-        Of the samples, Hz.
+    """The clock of a data logger during one case, as of `sense`, at a rate in Hz.
 
     Attributes
     ----------
@@ -236,14 +228,13 @@ def _known(given: Mapping[str, Any]) -> Mapping[str, Any]:
 
 def _turning(case: xr.Dataset) -> tuple[Any, float, int, int]:
     """Revolutions as a function of the time (s), duration of the record, its samples, and those a turn."""
+    n = samples_per_revolution(case)
     if not is_run_up(case):
-        data = narrow(case, ["spin_speed"])
-        n, n_sample = samples_per_revolution(case["revolution"]), case.sizes["sample"]
-        rate = abs(float(data["spin_speed"])) / (2.0 * math.pi)
+        n_sample = case.sizes["sample"]
+        rate = abs(float(narrow(case, ["spin_speed"])["spin_speed"])) / (2.0 * math.pi)
         return (lambda time: time * rate), n_sample / (n * rate), n_sample, n
     turning = narrow(case, ["speed", "time"]).load()
     turning = turning.isel(revolution=np.isfinite(turning["speed"].values))
     speeds, begins = turning["speed"].values, turning["time"].values
     ends = np.append(begins, begins[-1] + 2.0 * math.pi / speeds[-1]) - begins[0]
-    n = round(1.0 / float(case[TURNED][1] - case[TURNED][0]))
     return CubicSpline(ends, np.arange(ends.size)), float(ends[-1]), n * speeds.size, n

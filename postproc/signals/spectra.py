@@ -13,12 +13,12 @@ import numpy as np
 import xarray as xr
 
 from postproc.store.attributes import MEASURED
-from postproc.store.axes import find_axis, source
+from postproc.store.axes import find_axis, refusal
 from postproc.store.select import narrow
 from postproc.store.variables import require_variables
 from rubhpc import spectra
 from rubhpc.errors import InputError
-from rubhpc.schema import PROBE, SIGNAL_NAMES, is_signal
+from rubhpc.schema import PROBE, SIGNAL_NAMES, TURNED, is_signal
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -29,10 +29,10 @@ if TYPE_CHECKING:
 WHIRL = "whirl"  # the motion of the disc's centre, v + i w
 
 
-def samples_per_revolution(waveform: xr.DataArray) -> int:
-    """Return how many samples a waveform has in a revolution, from its `revolution` coordinate."""
-    revolution = waveform["revolution"].values
-    return round((revolution.size - 1) / float(revolution[-1] - revolution[0]))
+def samples_per_revolution(waveform: xr.DataArray | xr.Dataset) -> int:
+    """Return how many samples waveforms have in a revolution, from their `revolution`, or `turned`."""
+    turned = waveform[TURNED if TURNED in waveform.coords else "revolution"].values
+    return round((turned.size - 1) / float(turned[-1] - turned[0]))
 
 
 def last_revolutions(waveform: xr.DataArray, revolutions: int) -> xr.DataArray:
@@ -74,10 +74,7 @@ def full_spectrum(vertical: xr.DataArray, horizontal: xr.DataArray) -> xr.DataAr
 def spectrum_of(store: xr.Dataset, signal: str) -> xr.DataArray:
     """Return the spectrum of a signal: the stored one, or else the stored waveform's; lazy.
 
-    Raises
-    ------
-    InputError
-        The signal is unknown, or the store keeps neither its spectrum nor its waveform.
+    InputError where the signal is unknown, or the store keeps neither.
     """
     check_signal(signal)
     stored = f"spectrum_{signal}"
@@ -85,27 +82,21 @@ def spectrum_of(store: xr.Dataset, signal: str) -> xr.DataArray:
         return store[stored]
     if signal in store:
         return amplitude_spectrum(store[signal])
-    raise InputError(
-        f"{source(store)}: keeps neither {stored} nor the waveform {signal}; "
-        'run the study with "spectrum" in [record] keep'
+    raise refusal(
+        store,
+        f'keeps neither {stored} nor the waveform {signal}; run the study with "spectrum" in [record] keep',
     )
 
 
 def periodic_spectrum(
     store: xr.Dataset, signal: str, spread: Iterable[str] = ()
 ) -> tuple[xr.DataArray, xr.Dataset]:
-    """Return the spectra of a signal over whole periods of most cases, and those cases; lazy.
+    """Return spectra of a signal, or of the "whirl", over whole periods of most cases, and those cases; lazy.
 
     Stored spectra split a period that does not divide the recorded revolutions: 64 hold 21 1/3 periods of a
     motion that repeats every third, whose lines then fall between those stored and are drawn too low. Where
-    waveforms are stored, the last 63 (60, if others repeat every other) put them right.
-
-    Parameters
-    ----------
-    store : Dataset
-        All axes of more than one value must have been selected, but those in `spread`.
-    signal : str
-        A recorded one, or "whirl": the full spectrum of the orbit, from its waveforms.
+    waveforms are stored, the last 63 (60, if others repeat every other) put them right. All axes of more than
+    one value must have been selected, but those in `spread`.
     """
     if signal == WHIRL:
         names = ["vertical", "horizontal", "spin_speed", *(n for n in ("period",) if n in store)]

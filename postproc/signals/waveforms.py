@@ -10,11 +10,10 @@ import xarray as xr
 
 from postproc.signals.spectra import check_signal, samples_per_revolution
 from postproc.store.attributes import MEASURED
-from postproc.store.axes import find_axis, source
+from postproc.store.axes import find_axis, refusal
 from postproc.store.rig_of_case import bores_around, is_carried, rig_of, stator_places, stators_around
 from postproc.store.run_ups import first_around, is_run_up
 from postproc.store.select import narrow
-from rubhpc.errors import InputError
 from rubhpc.schema import CONTACT_ANGLE, is_signal
 
 if TYPE_CHECKING:
@@ -51,7 +50,7 @@ def waveform_data(
     revolutions : int, optional
         How many; None for all that were recorded.
     at : float, rad/s, optional
-        Spin speed of a run-up.
+        Spin speed of a run-up; InputError where it is none of its speeds.
 
     Returns
     -------
@@ -59,11 +58,6 @@ def waveform_data(
         The signals over `sample`, with the coordinate `revolution` and, where all cases turn at one speed,
         `time` (s) from the first sample kept. Of run-ups that reach their end or the speed in different
         revolutions, `revolution` counts from that of each.
-
-    Raises
-    ------
-    InputError
-        The speed is none of the run-up's, or of a study at constant speeds.
     """
     for signal in signals:
         check_signal(signal, store)
@@ -85,24 +79,11 @@ def orbit_data(
 ) -> xr.Dataset:
     """Return the last revolutions of vertical and horizontal motion, with the clearance; lazy.
 
-    Of one case whose stators stand on a carrier, `carrier_vertical` and `carrier_horizontal` (m, over the
+    Arguments are those of `waveform_data`, of a store with the motion of a place as `moved_at` returns it. Of
+    one case whose stators stand on a carrier, `carrier_vertical` and `carrier_horizontal` (m, over the
     stators) are where that is on average in these revolutions; of bores, where the hole is. There
     `rim_vertical` and `rim_horizontal` (m, over the bores and samples) are the centre of a rim that touches
     the hole at the contact point.
-
-    Parameters
-    ----------
-    store : Dataset
-        One case, or cases along the axis `over`, with the motion of a place as `moved_at` returns it.
-    revolutions : int, optional
-        How many; all that were recorded by default.
-    at : float, rad/s, optional
-        Spin speed of a run-up, around which revolutions are kept in place of the last ones.
-
-    Raises
-    ------
-    InputError
-        As of `waveform_data`.
     """
     spread = [find_axis(store, over)] if over else []
     names = ["vertical", "horizontal", *([] if MEASURED in store.attrs else ["clearance"])]
@@ -139,10 +120,10 @@ def _kept(
     n = samples_per_revolution(data["revolution"])
     if not is_run_up(store):
         if at is not None:
-            raise InputError(f"{source(store)}: at: its speeds are constant; select one of them")
+            raise refusal(store, "at: its speeds are constant; select one of them")
         return data if revolutions is None else data.isel(sample=slice(-revolutions * n, None))
     spread = [find_axis(store, over)] if over else []
-    speed = (narrow(store, ["speed"], spread) if "status" in store else store)["speed"]
+    speed = narrow(store, ["speed"], spread)["speed"]
     turned = speed.notnull().sum("revolution").values
     if not turned.any() or (revolutions is None and at is None and np.unique(turned[turned > 0]).size > 1):
         return data
@@ -154,16 +135,12 @@ def _kept(
     same = np.unique(ends[turned > 0])
     if same.size == 1:
         return data.isel(sample=slice((int(same[0]) - count) * n, int(same[0]) * n))
-    before = {"sample": slice(0, count * n)}
-    shifts = xr.DataArray(count - ends, dims=spread)
-    rows = [
-        data.isel({spread[0]: i}).drop_vars("revolution").shift(sample=int(shift) * n).isel(before)
-        for i, shift in enumerate(shifts.values)
-    ]
+    first = xr.DataArray(np.maximum(ends - count, 0) * n, dims=spread)  # where a case has no revolution: NaN
+    rows = data.drop_vars("revolution").isel(sample=first + xr.DataArray(np.arange(count * n), dims="sample"))
     place = np.arange(count * n) / n - (count if at is None else count // 2)
     where = "the end" if at is None else "that at the speed"
     about = {"units": "1", "long_name": f"revolution, from {where}"}
-    return xr.concat(rows, spread[0]).assign_coords(revolution=("sample", place, about))
+    return rows.assign_coords(revolution=("sample", place, about))
 
 
 def _ends_around(
@@ -187,14 +164,9 @@ def _speeds(speed: xr.DataArray, until: NDArray[np.int64], revolutions: int) -> 
 def mean_shift(tips: xr.Dataset) -> NDArray[np.float64]:
     """Return how far the carrier of each stator has moved up and to +z on average, (n_stator, 2), m.
 
-    It is read from the tips that touch nothing, which move with it: `v cos a + w sin a` outwards and
-    `w cos a - v sin a + s` along the rim, where s is a turn. Stators on the ground have not moved. Of
-    a bore it is how far the hole has moved.
-
-    Parameters
-    ----------
-    tips : Dataset
-        `stator_axial`, `stator_lateral` (m) and `contact_force` (N) of one case over stator and sample.
+    It is read from the tips (of one case, over stator and sample) that touch nothing, which move with it:
+    `v cos a + w sin a` outwards and `w cos a - v sin a + s` along the rim, where s is a turn. Stators on the
+    ground have not moved. Of a bore it is how far the hole has moved.
     """
     stators = rig_of(tips).stator
     axial, lateral, force = (tips[name].transpose("stator", "sample").values.mean(axis=1) for name in NEEDED)

@@ -32,14 +32,13 @@ _OF_ROOT = ("study", "rig", "versions")  # tables
 _TEXTS = ("units", "long_name", "flag_meanings")  # of arrays
 _FILL = "_FillValue"  # which xarray adds to a copy
 _CODED = ("scale_factor", "add_offset", "missing_value", "dtype", "_Unsigned")  # as no array of a store is
-_TABLES: dict[str, type | None] = {
+KEYS: dict[str, type] = {  # of the tables of a study
+    "run_up": RunUpKeys,
+    "drive": DriveKeys,
     "contact": ContactKeys,
     "integrator": Integrator,
     "record": Recording,
-    "run_up": RunUpKeys,
-    "drive": DriveKeys,
-    "branch": None,
-    "sample": None,
+    "probe": Probe,
     "initial": Initial,
 }
 _NUMBERS, _LARGEST = (int, float), 2.0**63
@@ -55,10 +54,7 @@ def table_of(store: xr.Dataset, name: str) -> dict[str, Any]:
 def with_sound_attributes(store: xr.Dataset, path: Path) -> xr.Dataset:
     """Return a store whose attributes are numbers, lists of them, and printable texts; lazily, as it was.
 
-    Raises
-    ------
-    StoreError
-        Attributes are of other types than a run writes, or values of an axis that has words are none of them.
+    StoreError where they are of other types than a run writes, or values of an axis have no meaning.
     """
     try:
         attributes = {name: _parsed(v) if name in _OF_ROOT else v for name, v in store.attrs.items()}
@@ -138,21 +134,21 @@ def _check_root(attributes: dict[str, Any]) -> None:
             raise TypeError(f"unit of {name} is no text")
         if not isinstance(values, list) or not all(isinstance(v, str) or type(v) in _NUMBERS for v in values):
             raise TypeError(f"values of {name} are neither numbers nor texts")
-    for name, kind in _TABLES.items():
+    probes = study.get("record", {}).get("probe", [])
+    for name in (*KEYS, "branch", "sample"):
         table = study.get(name, {})
-        probes = table.get("probe", []) if name == "record" else []
-        known = {} if kind is None else {key_of(field): field for field in dataclasses.fields(kind)}
-        _check_table({key: v for key, v in table.items() if key != "probe" or name != "record"}, known, name)
-        for probe in probes:
-            _check_table(probe, {key_of(field): field for field in dataclasses.fields(Probe)}, "probe")
-            if not isinstance(probe["name"], str):
-                raise TypeError("a probe without a name")
+        _check_table({key: v for key, v in table.items() if key != "probe" or name != "record"}, name)
+    for probe in probes:
+        _check_table(probe, "probe")
+        if not isinstance(probe["name"], str):
+            raise TypeError("a probe without a name")
     if "branch" in study and not isinstance(study["branch"]["along"], str):
         raise TypeError("branches along no axis")
 
 
-def _check_table(table: dict[str, Any], known: dict[str, Any], where: str) -> None:
+def _check_table(table: dict[str, Any], where: str) -> None:
     """Refuse values that their keys cannot have, and of unknown keys all but numbers and texts."""
+    known = {key_of(field): field for field in dataclasses.fields(KEYS[where])} if where in KEYS else {}
     for key, value in table.items():
         if isinstance(value, str) and key in known and value in known[key].metadata.get("gone", ()):
             continue  # stores keep what was written when they were made

@@ -19,6 +19,11 @@ def source(store: xr.Dataset) -> str:
     return str(store.encoding.get("source", "this store"))
 
 
+def refusal(store: xr.Dataset, problem: str) -> InputError:
+    """Return the error of a problem with a store, which names its path."""
+    return InputError(f"{source(store)}: {problem}")
+
+
 def axes_of(store: xr.Dataset) -> tuple[str, ...]:
     """Return the study's axes that are left, in the order of its grid; none for a single record."""
     return tuple(str(d) for d in store["status"].dims) if "status" in store else ()
@@ -27,10 +32,7 @@ def axes_of(store: xr.Dataset) -> tuple[str, ...]:
 def ordered_axes(store: xr.Dataset, figure: str) -> list[str]:
     """Return the axes of several values, along which a figure can run; the cases of a sample are in no order.
 
-    Raises
-    ------
-    InputError
-        There is none; the message names the `figure` that needs one.
+    InputError where there is none; the message names the `figure` that needs one.
     """
     axes = [axis for axis in axes_of(store) if store.sizes[axis] > 1 and axis != CASE]
     if not axes:
@@ -38,7 +40,7 @@ def ordered_axes(store: xr.Dataset, figure: str) -> list[str]:
         left = what if drawn_axes(store) else "this selection is one case"
         if "revolution" in store.dims:
             left = "the speed of this case changes, rubhpc waterfall draws it"
-        raise InputError(f"{source(store)}: {figure} needs an axis of several values; {left}")
+        raise refusal(store, f"{figure} needs an axis of several values; {left}")
     return axes
 
 
@@ -54,22 +56,20 @@ def drawn_axes(store: xr.Dataset) -> list[str]:
 def find_axis(store: xr.Dataset, name: str) -> str:
     """Return the dimension of an axis, given by its name or its dotted rig key; "stator" counts as an axis.
 
-    Raises
-    ------
-    InputError
-        There is no such axis left; the message names the nearest one, or all.
+    InputError where there is no such axis left; the message names the nearest one, or all.
     """
     axis = name.replace(".", "_")
     known = [*axes_of(store), *(d for d in ("stator",) if d in store.dims)]
     if axis in known:
         return axis
     if axis in store.coords and store.coords[axis].ndim == 0:
-        raise InputError(f"{source(store)}: {name}: is selected already; select it once")
+        raise refusal(store, f"{name}: is selected already; select it once")
     if axis in drawn_axes(store):
-        raise InputError(
-            f"{source(store)}: {name}: was drawn at random and is not an axis; rubhpc map draws measures "
-            "over drawn quantities"
+        raise refusal(
+            store,
+            f"{name}: was drawn at random and is not an axis; rubhpc map draws measures "
+            "over drawn quantities",
         )
     near = difflib.get_close_matches(axis, known, n=1)
     hint = f"did you mean {near[0]}?" if near else f"the axes are {', '.join(known) or 'none'}"
-    raise InputError(f"{source(store)}: no axis {name}; {hint}")
+    raise refusal(store, f"no axis {name}; {hint}")

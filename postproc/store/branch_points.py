@@ -6,8 +6,7 @@ import numpy as np
 import xarray as xr
 
 from postproc.store.attributes import table_of
-from postproc.store.axes import source
-from rubhpc.errors import InputError
+from postproc.store.axes import refusal
 from rubhpc.schema import BRANCH_EVENT, POINT
 
 NAMES = ("unstable", "stable")  # meanings of `stability`
@@ -38,18 +37,14 @@ def check_points(store: xr.Dataset) -> None:
     """Refuse a store of branches without a point."""
     if store.sizes.get("point") == 0:
         problem = "contains no point of a branch"
-        raise InputError(f"{source(store)}: {problem}; rubhpc status says whether any was found or computed")
+        raise refusal(store, f"{problem}; rubhpc status says whether any was found or computed")
 
 
 def one_case(points: xr.Dataset) -> tuple[xr.Dataset, str, list[str]]:
     """Return the points at the first value of every axis, the axis followed, and a line on each such axis.
 
-    Axes of one value become coordinates without a dimension, as captions have them.
-
-    Raises
-    ------
-    InputError
-        There is no point.
+    Axes of one value become coordinates without a dimension, as captions have them. InputError where there is
+    no point.
     """
     check_points(points)
     notes = []

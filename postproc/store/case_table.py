@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
-from postproc.store.axes import axes_of, source
+from postproc.store.axes import axes_of, refusal
+from postproc.store.export import complete, heading
 from postproc.store.select import worst_of_stators
 from rubhpc.errors import InputError
 from rubhpc.schema import VARIABLES
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
 TABLES = (".csv", ".parquet")
@@ -30,26 +30,17 @@ def case_table(store: xr.Dataset, names: Sequence[str] = ()) -> xr.Dataset:
     """Return the cases of a store as columns over `row`, loaded, in the order of the grid.
 
     The values of axes come first, then what was drawn or selected, then settings, flags (in words) and
-    measures. Of several stators a column has the worst (`postproc.store.select`), and the last ones, named as
-    `peak_contact_force_stator_3`, have each of them.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Variables to take; none: all that have one value a case or one a stator.
-
-    Raises
-    ------
-    InputError
-        A variable has many values a case.
+    measures: the variables `names`, or all that have one value a case or one a stator. Of several stators a
+    column has the worst (`postproc.store.select`), and the last ones, named as `peak_contact_force_stator_3`,
+    have each of them. InputError where a variable has many values a case.
     """
     axes = axes_of(store)
     known = [str(n) for n, v in store.data_vars.items() if set(v.dims) <= {*axes, "stator"}]
     for name in names:
         if name not in known:
-            raise InputError(
-                f"{source(store)}: {name}: has many values a case, and a table has one row a case; export it "
-                "as .h5 or .nc"
+            raise refusal(
+                store,
+                f"{name}: has many values a case, and a table has one row a case; export it as .h5 or .nc",
             )
     chosen = [name for name in known if not names or name in names]
     data = worst_of_stators(store, chosen)
@@ -67,13 +58,18 @@ def case_table(store: xr.Dataset, names: Sequence[str] = ()) -> xr.Dataset:
                 each[f"{name}_stator_{int(store['stator'][i])}"] = store[name].isel(stator=i)
     wanted |= each
     in_order = dict.fromkeys(n for n in (*axes, *wanted) if n in wanted)  # points are no coordinate
-    shape = store["status"]
+    table = _table({name: wanted[name] for name in in_order}, store, store["status"].transpose(*axes))
+    return table.map(lambda column: _in_words(column, wanted[str(column.name)]), keep_attrs=True)
+
+
+def _table(found: Mapping[str, xr.DataArray], store: xr.Dataset, shape: xr.DataArray) -> xr.Dataset:
+    """Return variables as columns, (n_row,), of the cells of an array."""
     columns = {}
-    for name in in_order:
-        values = wanted[name].squeeze("stator") if "stator" in wanted[name].dims else wanted[name]
-        column = values.broadcast_like(shape).transpose(*axes).values.ravel()
-        about = {k: str(v) for k, v in wanted[name].attrs.items() if k in ("units", "long_name")}
-        columns[name] = (_ROW, _in_words(name, column, wanted[name]), about)
+    for name, values in found.items():
+        one = values.squeeze([d for d in ("stator",) if d in values.dims])
+        column = one.broadcast_like(shape).transpose(*shape.dims).values.ravel()
+        about = {k: str(v) for k, v in values.attrs.items() if k in ("units", "long_name")}
+        columns[name] = (_ROW, column, about)
     return xr.Dataset(columns, attrs=metadata_of(store))
 
 
@@ -87,23 +83,15 @@ def write_table(table: xr.Dataset, path: Path) -> None:
     """Write a table of `case_table` as CSV, or Parquet; it gets its name once it is complete.
 
     In CSV the unit is in the heading, as in `clearance (m)`; in Parquet it is in the metadata of each column,
-    with its long name, and study and rig are in those of the file.
-
-    Raises
-    ------
-    InputError
-        Parquet needs the extra `parquet`, which is not installed.
+    with its long name, and study and rig are in those of the file. InputError where pyarrow is not installed.
     """
-    partial = path.with_name(f".{path.name}.part")
-    try:
+    with complete(path) as partial:
         if path.suffix.lower() == ".csv":
             frame = table.to_dataframe()[list(table.data_vars)]
-            frame.rename(columns={str(n): _heading(v) for n, v in table.items()}).to_csv(partial, index=False)
+            headings = {str(name): heading(str(name), column) for name, column in table.items()}
+            frame.rename(columns=headings).to_csv(partial, index=False)
         else:
-            _write_parquet(table, partial)
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
+            _write_parquet(table, path.name, partial)
 
 
 def import_parquet(file: str, instead: str = "") -> tuple[Any, Any]:
@@ -119,8 +107,7 @@ def import_parquet(file: str, instead: str = "") -> tuple[Any, Any]:
     return pyarrow, parquet
 
 
-def _write_parquet(table: xr.Dataset, path: Path) -> None:
-    file = path.name.removeprefix(".").removesuffix(".part")
+def _write_parquet(table: xr.Dataset, file: str, path: Path) -> None:
     pyarrow, parquet = import_parquet(file, ", or export .csv")
     arrays, fields = [], []
     for name, column in table.items():
@@ -133,21 +120,17 @@ def _write_parquet(table: xr.Dataset, path: Path) -> None:
     parquet.write_table(pyarrow.table(arrays, schema=schema), path, compression="zstd")
 
 
-def _in_words(name: str, column: Any, source_of: xr.DataArray) -> Any:
+def _in_words(column: xr.DataArray, source_of: xr.DataArray) -> xr.DataArray:
     """Return the values of a flag or a direction in words, others as they are; -1 of integers becomes NaN."""
-    variable = VARIABLES.get(name)
+    variable = VARIABLES.get(str(column.name))
     words = variable.flags if variable is not None else ()
     words = words or tuple(str(source_of.attrs.get("flag_meanings", "")).split())
     if words:
-        return np.array([words[i] if 0 <= i < len(words) else "" for i in column.astype(int)], dtype=object)
+        named = [words[i] if 0 <= i < len(words) else "" for i in column.values.astype(int)]
+        return column.copy(data=np.array(named, dtype=object))
     if variable is not None and variable.role == "measure" and variable.dtype.startswith("int"):
-        return np.where(column == -1, math.nan, column)
+        return column.copy(data=np.where(column.values == -1, math.nan, column.values))
     return column
-
-
-def _heading(column: xr.DataArray) -> str:
-    unit = str(column.attrs.get("units", "1"))
-    return f"{column.name} ({unit})" if unit not in ("", "1") else str(column.name)
 
 
 def has_revolutions(store: xr.Dataset, names: Sequence[str]) -> bool:
@@ -165,7 +148,6 @@ def revolution_table(store: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
     axes = axes_of(store)
     rows = (*axes, _ALONG)
     shape = store["speed"].transpose(*rows)
-    has_turned = np.isfinite(shape.values).ravel()
     found: dict[str, xr.DataArray] = {name: store[name] for name in (*axes, _ALONG, *_ALWAYS)}
     for name in names:
         within = [dim for dim in store[name].dims if dim not in rows]
@@ -175,9 +157,4 @@ def revolution_table(store: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
         for dim in within:  # one at most: orders or stators
             for i, label in enumerate(store[dim].values):
                 found[f"{name}_{dim}_{label:.3g}"] = store[name].isel({dim: i})
-    columns = {}
-    for name, values in found.items():
-        column = values.broadcast_like(shape).transpose(*rows).values.ravel()[has_turned]
-        about = {k: str(v) for k, v in values.attrs.items() if k in ("units", "long_name")}
-        columns[name] = (_ROW, column, about)
-    return xr.Dataset(columns, attrs=metadata_of(store))
+    return _table(found, store, shape).isel({_ROW: np.isfinite(shape.values).ravel()})

@@ -5,12 +5,15 @@ from __future__ import annotations
 import json
 import math
 import os
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rubhpc.errors import InputError, writing
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     import xarray as xr
 
 HDF5 = (".nc", ".h5", ".hdf5")
@@ -37,13 +40,7 @@ def check_data_path(path: str | Path) -> Path:
 
 
 def write_data(data: xr.Dataset, path: str | Path) -> Path:
-    """Write a dataset, in csv one line a point, and return its path.
-
-    Raises
-    ------
-    InputError
-        The extension is unknown, or the file cannot be written.
-    """
+    """Write a dataset, in csv one line a point, and return its path; InputError where it cannot be."""
     path = check_data_path(path)
     kind = path.suffix.lower()
     data = data.copy()
@@ -60,14 +57,29 @@ def write_data(data: xr.Dataset, path: str | Path) -> Path:
     return path
 
 
+def heading(name: str, column: xr.DataArray | xr.Variable) -> str:
+    """Return the heading of a column of a table: its name, with the unit in brackets."""
+    unit = str(column.attrs.get("units", "1"))
+    return f"{name} ({unit})" if unit not in ("", "1") else name
+
+
 def _write_csv(data: xr.Dataset, path: Path) -> None:
-    """Write one column a variable, with its unit in the heading."""
+    """Write one column a variable, the dimensions first."""
     table = data.to_dataframe().reset_index()
-    units = {str(n): str(v.attrs.get("units", "1")) for n, v in data.variables.items()}
-    headings = {n: f"{n} ({u})" for n, u in units.items() if u not in ("", "1")}
-    dims = list(data.dims)
-    columns = [*dims, *(c for c in table.columns if c not in dims)]
-    table[[c for c in columns if c in table]].rename(columns=headings).to_csv(path, index=False)
+    columns = [*(d for d in data.dims if d in table), *(c for c in table.columns if c not in data.dims)]
+    headings = {str(n): heading(str(n), v) for n, v in data.variables.items()}
+    table[columns].rename(columns=headings).to_csv(path, index=False)
+
+
+@contextmanager
+def complete(path: Path) -> Iterator[Path]:
+    """Yield where a file is to be written; it gets its name once it is complete."""
+    partial = path.with_name(f".{path.name}.part")
+    try:
+        yield partial
+        os.replace(partial, path)
+    finally:
+        partial.unlink(missing_ok=True)
 
 
 def write_hdf5(data: xr.Dataset, path: Path) -> None:
@@ -79,13 +91,9 @@ def write_hdf5(data: xr.Dataset, path: Path) -> None:
     data.attrs = {
         k: v if isinstance(v, str | int | float) else json.dumps(_plain(v)) for k, v in data.attrs.items()
     }
-    partial = path.with_name(f".{path.name}.part")
-    try:
-        packed = {n: _COMPRESSED for n, v in data.variables.items() if v.ndim and v.dtype.kind in "fiu"}
+    packed = {n: _COMPRESSED for n, v in data.variables.items() if v.ndim and v.dtype.kind in "fiu"}
+    with complete(path) as partial:
         data.to_netcdf(partial, engine="h5netcdf", encoding=packed)
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def _plain(value: Any) -> Any:

@@ -60,9 +60,9 @@ def open_store(path: str | Path) -> xr.Dataset:
 
 
 def _opened(path: Path) -> xr.Dataset:
-    arrays = _open(path, chunks={})
+    arrays = open_arrays(path, chunks={})
     long = [str(n) for n in arrays.data_vars if role_of(str(n)) in SIGNAL_ROLES]
-    store: xr.Dataset = _open(path, chunks="auto", without=long).assign(arrays[long].data_vars)
+    store: xr.Dataset = open_arrays(path, chunks="auto", without=long).assign(arrays[long].data_vars)
     store = store[
         [*(n for n in VARIABLES if n in store.data_vars), *(n for n in store.data_vars if n not in VARIABLES)]
     ]
@@ -81,7 +81,8 @@ def _opened(path: Path) -> xr.Dataset:
     return as_run_ups(store) if is_run_up(store) else fill_inferred(store, path)
 
 
-def _open(path: Path, chunks: Any, without: Sequence[str] = ()) -> xr.Dataset:
+def open_arrays(path: Path, chunks: Any, without: Sequence[str] = ()) -> xr.Dataset:
+    """Return the arrays of a store as they lie on the disk, in chunks, or lazy without dask for None."""
     import xarray as xr
     import zarr
 
@@ -143,14 +144,10 @@ def _mapped(function: Any, values: xr.DataArray, status: xr.DataArray) -> xr.Dat
 def open_live(path: Path) -> xr.Dataset:
     """Return the store as `open_store` does, with status and measures of every case in the journals.
 
-    What only the journals contain becomes attributes: `reasons` (flat index of a case to why it failed
-    or diverged), `runs` (machine, ranks and times of each) and `running` (who computes now; "" if nobody).
-    A store without journals, such as a copy made with xarray, is returned unchanged.
-
-    Raises
-    ------
-    StoreError
-        There is no store, or it is damaged.
+    What only the journals contain becomes attributes: `reasons` (flat index of a case to why it failed or
+    diverged), `runs` (machine, ranks and times of each) and `running` (who computes now; "" if nobody). A
+    store without journals, such as a copy made with xarray, is returned unchanged. StoreError where there is
+    no store, or it is damaged.
     """
     dataset = open_store(path)
     if not is_store(path):

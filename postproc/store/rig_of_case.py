@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
 from postproc.store.attributes import MEASURED, table_of
-from postproc.store.axes import source
-from rubhpc.errors import InputError
+from postproc.store.axes import refusal, source
 from rubhpc.models import ABSENT, in_words
 from rubhpc.rig.reading import rig_from_dict, with_keys
 from rubhpc.rig.stators import Stator, geometries
 from rubhpc.schema import BORE_MEASURES
-from rubhpc.study.axes import coordinate_of, is_of_table
+from rubhpc.study.axes import axis_table, coordinate_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from rubhpc.fem.modes import Mode
     from rubhpc.rig.rig import Rig
 
 Place = tuple[float | None, float, float, float]  # of a stator: `stator_places`
@@ -28,15 +26,8 @@ ROTOR_MODES = ("lateral", "torsional")
 def rig_of(case: xr.Dataset, values: Mapping[str, float] | None = None) -> Rig:
     """Return the rig of one case: the store's, with the rig keys among its axes at their selected values.
 
-    Parameters
-    ----------
-    values : mapping of dimension to value, optional
-        Of axes that are not selected.
-
-    Raises
-    ------
-    InputError
-        The store contains no rig, or one that this version cannot read.
+    `values` are those of axes that are not selected. InputError where the store contains no rig, or one that
+    this version cannot read.
     """
     table = table_of(case, "rig")
     if not table:
@@ -45,7 +36,7 @@ def rig_of(case: xr.Dataset, values: Mapping[str, float] | None = None) -> Rig:
             if MEASURED in case.attrs
             else "give a store that rubhpc has written"
         )
-        raise InputError(f"{source(case)}: contains no rig; {fix}")
+        raise refusal(case, f"contains no rig; {fix}")
     rig = rig_from_dict(table, f"{source(case)}: rig")
     chosen = {
         str(n): float(c.values.item())
@@ -75,19 +66,15 @@ def natural_frequencies(case: xr.Dataset, along: str | None = None) -> dict[str,
     Where keys of the rig lie on the dimension `along`, such as a bearing's stiffness on its own or all that
     was drawn on that of a sample, each is an array over it.
     """
-    from rubhpc.fem.assemble import assemble
-    from rubhpc.fem.modes import modes
-
-    return _over_rig(case, along, lambda rig: _first_of_kinds(modes(assemble(rig).rotor), ROTOR_MODES))
+    return _over_rig(case, along, lambda rig: _first_of_kinds(_assembled(rig).rotor, ROTOR_MODES))
 
 
 def frequencies_at_speed(case: xr.Dataset, spin: float) -> dict[str, list[float]]:
     """Return the natural frequencies (Hz) of the rotor of a case at a speed (rad/s), by kind."""
-    from rubhpc.fem.assemble import assemble
     from rubhpc.fem.modes import modes
 
     found: dict[str, list[float]] = {}
-    for mode in modes(assemble(rig_of(case)).rotor, spin):
+    for mode in modes(_assembled(rig_of(case)).rotor, spin):
         if mode.frequency > 0.0:
             found.setdefault(mode.kind, []).append(mode.frequency)
     return found
@@ -95,21 +82,29 @@ def frequencies_at_speed(case: xr.Dataset, spin: float) -> dict[str, list[float]
 
 def stator_frequencies(case: xr.Dataset, along: str | None = None) -> dict[str, xr.DataArray]:
     """Return the first lateral natural frequency of the stator selected, or of the first, Hz; see above."""
-    from rubhpc.fem.assemble import assemble
-    from rubhpc.fem.modes import modes
-
     chosen = case.coords.get("stator")
     i_stator = int(chosen) - 1 if chosen is not None and chosen.ndim == 0 else 0
-    return _over_rig(
-        case,
-        along,
-        lambda rig: _first_of_kinds(modes(assemble(rig).stators[i_stator].held.body), ("lateral",)),
-    )
+
+    def of_stator(rig: Rig) -> dict[str, float]:
+        return _first_of_kinds(_assembled(rig).stators[i_stator].held.body, ("lateral",))
+
+    return _over_rig(case, along, of_stator)
 
 
-def _first_of_kinds(found: Sequence[Mode], kinds: Sequence[str]) -> dict[str, float]:
-    lowest = {k: [m.frequency for m in found if m.kind == k and m.frequency > 0] for k in kinds}
-    return {kind: min(frequencies) for kind, frequencies in lowest.items() if frequencies}
+def _assembled(rig: Rig) -> Any:
+    """The matrices of a rig; few figures need the library behind them."""
+    from rubhpc.fem.assemble import assemble
+
+    return assemble(rig)
+
+
+def _first_of_kinds(body: Any, kinds: Sequence[str]) -> dict[str, float]:
+    """The lowest natural frequency above 0 of a body at standstill, Hz, of each kind that it has."""
+    from rubhpc.fem.modes import modes
+
+    found = [mode for mode in modes(body) if mode.frequency > 0]
+    present = {mode.kind for mode in found}
+    return {kind: min(m.frequency for m in found if m.kind == kind) for kind in kinds if kind in present}
 
 
 def _over_rig(
@@ -167,8 +162,6 @@ def stator_places(case: xr.Dataset) -> list[Place]:
 
     Then follow the horizontal and the vertical position, m, about which they are set. A bore has no angle.
     """
-    from rubhpc.fem.assemble import assemble
-
     around = stators_around(case)
     if not around:
         return []
@@ -176,7 +169,7 @@ def stator_places(case: xr.Dataset) -> list[Place]:
     stators = [rig.stator[i] for i in around]
     centres = [(0.0, 0.0)] * len(stators)
     if rig.rotor.aligned_at is not None or any(stator.is_bore for stator in stators):
-        models = assemble(rig).stators
+        models = _assembled(rig).stators
         centres = [models[i].centre for i in around]
     return [
         (None if s.is_bore else s.angle, s.clearance_offset, across, up)
@@ -219,5 +212,5 @@ def is_carried(case: xr.Dataset) -> bool:
 
 def rig_axes(case: xr.Dataset) -> dict[str, str]:
     """Return the axes of the study that are keys of the rig: coordinate to dotted key."""
-    keys = (name for name in table_of(case, "study").get("grid", {}) if "." in name and not is_of_table(name))
+    keys = (name for name in table_of(case, "study").get("grid", {}) if "." in name and not axis_table(name))
     return {coordinate_of(key): key for key in keys}

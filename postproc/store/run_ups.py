@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from postproc.store.axes import source
-from rubhpc.errors import InputError
+from postproc.store.axes import refusal
 from rubhpc.schema import TURNED
 from rubhpc.units import RPM
 
@@ -50,14 +49,11 @@ def as_run_ups(store: xr.Dataset) -> xr.Dataset:
 def steady_view(store: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
     """Return a store of run-ups for figures of variables `names`: signals have their coordinate `revolution`.
 
-    Raises
-    ------
-    InputError
-        The figure needs one speed.
+    InputError where the figure needs one speed.
     """
     if "spin_speed" in names or any(name.startswith("spectrum_") for name in names):
         fix = "draw it with rubhpc waterfall, bode, or spectrum --at SPEED"
-        raise InputError(f"{source(store)}: the speed changes, and this figure needs a constant one; {fix}")
+        raise refusal(store, f"the speed changes, and this figure needs a constant one; {fix}")
     if any("revolution" in store[name].dims for name in names if name in store):
         return store
     status = ["status"] if "status" in store else []
@@ -71,21 +67,14 @@ def steady_view(store: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
 def first_around(store: xr.Dataset, speed: NDArray[np.float64], count: int, at: float) -> int:
     """Return the first of `count` revolutions around the one that first has the speed `at`, rad/s.
 
-    Parameters
-    ----------
-    speed : (n_revolution,), rad/s
-        Of one run-up of the store.
-
-    Raises
-    ------
-    InputError
-        The run-up does not pass the speed.
+    `speed` (n_revolution,), rad/s, is that of one run-up of the store. InputError where it does not pass
+    `at`.
     """
     step, low, high = float(np.abs(np.diff(speed)).max(initial=0.0)), float(speed.min()), float(speed.max())
     if not low - step <= at <= high + step:
         given, least, most = (f"{RPM.factor * value:.6g}" for value in (at, low, high))
         problem = f"{given} rpm is none of its speeds, {least} to {most} rpm"
-        raise InputError(f"{source(store)}: at: {problem}; give one of these")
+        raise refusal(store, f"at: {problem}; give one of these")
     first = int(np.argmin(np.abs(speed - at))) - count // 2
     return int(np.clip(first, 0, speed.size - count))
 

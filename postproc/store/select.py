@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from postproc.store.axes import axes_of, drawn_axes, find_axis, source
+from postproc.store.axes import axes_of, drawn_axes, find_axis, refusal, source
 from postproc.store.branch_points import is_of_points
 from postproc.store.run_ups import is_run_up, steady_view
 from postproc.store.units import meanings
 from postproc.store.variables import require_variables
-from rubhpc.errors import InputError
 from rubhpc.input.quantity import parse_quantity
 from rubhpc.schema import VARIABLES
 from rubhpc.study.axes import coordinate_of, place_of, study_unit
@@ -89,7 +88,7 @@ def narrow(store: xr.Dataset, names: Iterable[str], spread: Iterable[str] = ()) 
     if several:
         which = "; ".join(f"{a} (one of {written_values(store[a])})" for a in several)
         example = f"--select {several[0]}={_written(store[several[0]], 0)!r}".replace("'", '"')
-        raise InputError(f"{source(store)}: select one value of {which}, as in {example}")
+        raise refusal(store, f"select one value of {which}, as in {example}")
     data = data.isel(dict.fromkeys(free, 0))
     return data.drop_vars(_of_stator(store), errors="ignore") if "stator" in free else data
 
@@ -153,9 +152,10 @@ def _positions(
         return _between(store, axis, wanted)
     if is_drawn:
         low, high = (_typed(store[axis], float(end)) for end in (store[axis].min(), store[axis].max()))
-        raise InputError(
-            f"{source(store)}: {axis}: was drawn at random; select a range of it, such as {low}..{high}, or "
-            f"a case by its number, {CASE}={int(store[CASE][0])}"
+        raise refusal(
+            store,
+            f"{axis}: was drawn at random; select a range of it, such as {low}..{high}, or "
+            f"a case by its number, {CASE}={int(store[CASE][0])}",
         )
     if isinstance(wanted, (list, tuple, np.ndarray)):
         return np.array([_nearest(store, axis, _number(store, axis, w)) for w in wanted])
@@ -170,7 +170,7 @@ def _between(store: xr.Dataset, axis: str, wanted: slice) -> NDArray[np.intp]:
     inside = np.flatnonzero((values >= low - slack) & (values <= high + slack))
     if inside.size == 0:
         known = written_values(store[axis])
-        raise InputError(f"{source(store)}: {axis}: no value in that range; there is {known}")
+        raise refusal(store, f"{axis}: no value in that range; there is {known}")
     return inside
 
 
@@ -182,9 +182,7 @@ def _number(store: xr.Dataset, axis: str, wanted: Any) -> float:
             if wanted in names:
                 return float(names.index(wanted))
             known = ", ".join(names)
-            raise InputError(
-                f"{source(store)}: {axis} = {wanted}: not on the grid; choose one of {known}"
-            ) from None
+            raise refusal(store, f"{axis} = {wanted}: not on the grid; choose one of {known}") from None
         unit = study_unit(str(store[axis].attrs.get("units", "1")))
         return float(parse_quantity(wanted, unit, f"{source(store)}: {axis}"))
 
@@ -193,17 +191,15 @@ def _nearest(store: xr.Dataset, axis: str, wanted: float) -> int:
     place = place_of(wanted, store[axis].values.astype(float))
     if place is None:
         text, near = _typed(store[axis], wanted), written_values(store[axis], around=wanted)
-        raise InputError(f"{source(store)}: {axis} = {text}: not on the grid; choose one of {near}")
+        raise refusal(store, f"{axis} = {text}: not on the grid; choose one of {near}")
     return place
 
 
 def worst_of_stators(store: xr.Dataset, names: Iterable[str]) -> xr.Dataset:
-    """Return the store with variables at the worst of its stators; lazy.
+    """Return the store with variables at the worst of its stators, as `rubhpc.schema` declares; lazy.
 
-    The largest value of all stators, or the smallest where `rubhpc.schema` declares that as the worse one. A
-    stator without a value, such as a duration without contact, is left out. The attribute `of_stators` of
-    these variables ("largest of 16 stators") becomes a part of their names on axes. Variables that do not
-    depend on the stator are unchanged, and so is a store of a single one.
+    A stator without a value, such as a duration without contact, is left out. The attribute `of_stators` of
+    these variables ("largest of 16 stators") becomes a part of their names on axes.
     """
     if store.sizes.get("stator", 1) == 1:
         return store

@@ -23,42 +23,26 @@ if TYPE_CHECKING:
 _SHORT = {
     "vertical": "Vertical displacement",
     "horizontal": "Horizontal displacement",
-    "torsion": "Torsion",
     "torsion_acceleration": "Torsional acceleration",
     "stator_axial": "Stator axial displacement",
     "stator_lateral": "Stator lateral displacement",
-    "contact_force": "Contact force",
-    "vertical_velocity": "Vertical velocity",
-    "horizontal_velocity": "Horizontal velocity",
     "torsion_velocity": "Torsional velocity",
     "speed_ratio": "Speed ratio $r$",
     "speed": "Spin speed",
-    "spin_speed": "Spin speed",
     "last_speed": "Last spin speed",
     "clearance_ratio": "Clearance ratio $c_g$",
-    "clearance": "Clearance",
     "friction": "Friction coefficient",
     "stator_youngs_modulus": "Stator modulus $E_s$",
     "initial_vertical": "Initial vertical displacement",
     "initial_horizontal": "Initial horizontal displacement",
-    "initial_vertical_velocity": "Initial vertical velocity",
-    "initial_horizontal_velocity": "Initial horizontal velocity",
     "initial_impulse": "Impulse",
     "initial_impulse_angle": "Angle of the impulse",
     "initial_impulse_node": "Node of the impulse",
-    "direction": "Direction",
-    "whirl": "Whirl",
-    "case": "Case",
-    "frequency": "Frequency",
     "order": "Order (multiples of spin speed)",
-    "revolution": "Revolution",
-    "time": "Time",
-    "wall_time": "Wall time",
     "tip_deflection_ratio": "Tip deflection over length",
     "foreshortening_ratio": "Foreshortening over compression",
     "force_over_euler_load": "Contact force over Euler load",
     "force_over_strength": "Contact force over stator strength",
-    "normal_angle": "Normal angle",
     "bearing_clearance_ratio": "Displacement over bearing clearance",
     "largest_multiplier": "Modulus of the largest multiplier",
     "multiplier_angle": "Angle of the largest multiplier",
@@ -67,23 +51,22 @@ _SHORT = {
     "left_closed_form": "Changes to collocation",
     "carrier_displacement": "Peak carrier displacement",
     "modal_error": "Error by modes left out",
-    "peak_torsion": "Peak torsion",
     "peak_to_peak_vertical": "Vertical peak to peak",
     "peak_to_peak_horizontal": "Horizontal peak to peak",
-    "contact_duration": "Contact duration",
     "contact_impulse": "Impulse per revolution",
     "friction_work": "Friction work per revolution",
     "minimum_slip_speed": "Lowest slip speed",
     "period": "Period (revolutions)",
-    "regime": "Regime",
-    "lyapunov_exponent": "Lyapunov exponent",
-    "whirl_ratio": "Whirl ratio",
-    "status": "Status",
-    "validity": "Validity",
     "energy_residual": "Energy balance residual",
-    "contact_iterations": "Contact iterations",
-    "contact_residual": "Contact residual",
 }
+# Names that say as much as their long names.
+_PLAIN = (
+    *("case", "clearance", "contact_duration", "contact_force", "contact_iterations", "contact_residual"),
+    *("direction", "frequency", "horizontal_velocity", "initial_horizontal_velocity"),
+    *("initial_vertical_velocity", "lyapunov_exponent", "normal_angle", "peak_torsion", "regime"),
+    *("revolution", "spin_speed", "status", "time", "torsion", "validity", "vertical_velocity", "wall_time"),
+    *("whirl", "whirl_ratio"),
+)
 _OF_SPECTRA = "amplitude (zero to peak) of the "
 _SYMBOLS = {
     "speed_ratio": "r",
@@ -126,10 +109,15 @@ def meanings(axis: xr.DataArray) -> list[str]:
     return str(axis.attrs.get("flag_meanings", "")).split()
 
 
+def in_words(flag: str) -> str:
+    """Return a value of a flag as a text has it: "quasi-periodic", "no contact"."""
+    return flag.replace("quasi_", "quasi-").replace("_", " ")
+
+
 def short_name(data: xr.DataArray) -> str:
     """Return a name of the quantity that fits an axis at column width."""
     name = str(data.name).removeprefix("spectrum_").removeprefix("section_")
-    text = _SHORT.get(name, "")
+    text = _SHORT.get(name, name.replace("_", " ") if name in _PLAIN else "")
     if name.startswith(PROBE):
         text = str(data.attrs.get("long_name", name)).removeprefix(_OF_SPECTRA)
         text = text.replace(" the probe ", " ").replace("_", " ")

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from postproc.store.attributes import MEASURED, table_of
-from postproc.store.axes import source
-from rubhpc.errors import InputError
+from postproc.store.axes import refusal
 from rubhpc.schema import PROBE, VARIABLES, is_signal, role_of
 
 if TYPE_CHECKING:
@@ -27,33 +26,31 @@ MEASURES = tuple(n for n, v in VARIABLES.items() if v.role in ("measure", "setti
 def require_variables(store: xr.Dataset, names: Iterable[str]) -> None:
     """Check that the store has the variables.
 
-    Raises
-    ------
-    InputError
-        One is missing; the message names the `[record] keep` that stores it, or the nearest name.
+    InputError where one is missing; the message names the `[record] keep` that stores it, or the nearest
+    name.
     """
     for name in names:
         if name in store:
             continue
         if MEASURED in store.attrs and is_signal(name):
             known = [str(n) for n in store.data_vars if is_signal(str(n))]
-            raise InputError(f"{source(store)}: {name}: was not measured; there are {', '.join(known)}")
+            raise refusal(store, f"{name}: was not measured; there are {', '.join(known)}")
         is_recorded = name in VARIABLES or name.removeprefix(PROBE) in probes_of(store)
         role = role_of(name) if is_recorded else ""
         if role in LONG_ROLES:
             fix = f'run the study with "{role}" in [record] keep'
-            raise InputError(f"{source(store)}: does not contain {name}; {fix}")
+            raise refusal(store, f"does not contain {name}; {fix}")
         known = [str(n) for n in store.data_vars]
         near = difflib.get_close_matches(name, known, n=1)
         hint = f"did you mean {near[0]}?" if near else f"the variables are {', '.join(known)}"
-        raise InputError(f"{source(store)}: no variable {name}; {hint}")
+        raise refusal(store, f"no variable {name}; {hint}")
 
 
 def require_measure(store: xr.Dataset, name: str) -> None:
     """Check that a name is that of a measure, and that the store has it; InputError where not."""
     if role_of(name) not in ("measure", "setting"):
         require_variables(store, [name])
-        raise InputError(f"{source(store)}: {name}: is not a measure; choose one of {', '.join(MEASURES)}")
+        raise refusal(store, f"{name}: is not a measure; choose one of {', '.join(MEASURES)}")
     require_variables(store, [name])
 
 
@@ -61,7 +58,7 @@ def require_results(values: ArrayLike, store: xr.Dataset) -> None:
     """Check that at least one value is finite; InputError where no selected case is done."""
     if not np.isfinite(np.asarray(values, dtype=float)).any():
         fix = "run the study to its end, or select cases that did not fail or diverge (`rubhpc status`)"
-        raise InputError(f"{source(store)}: no selected case is done; {fix}")
+        raise refusal(store, f"no selected case is done; {fix}")
 
 
 def probes_of(store: xr.Dataset) -> dict[str, dict[str, Any]]:
@@ -79,5 +76,5 @@ def probe_of(store: xr.Dataset, name: str) -> dict[str, Any]:
             "run the study with a [[record.probe]]" if MEASURED not in store.attrs else f"add [signal.{name}]"
         )
         fix = f"choose one of {', '.join(known)}" if known else fix
-        raise InputError(f"{source(store)}: no probe {name}; {fix}")
+        raise refusal(store, f"no probe {name}; {fix}")
     return known[name]

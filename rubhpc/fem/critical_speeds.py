@@ -12,6 +12,7 @@ import xarray as xr
 from scipy.optimize import brentq, linear_sum_assignment
 
 from rubhpc.fem.modes import KINDS, modes
+from rubhpc.schema import columns, described
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -47,27 +48,20 @@ def campbell(
         `speed` (rad/s). Modes are numbered by their natural frequency at the first speed.
     """
     tracks = follow_modes(body, speeds) if tracks is None else tracks
+    frequency, ratio, whirl = (
+        [[getattr(mode, name) for mode in track] for track in tracks]
+        for name in ("frequency", "damping_ratio", "whirl")
+    )
+    of_modes = {
+        "frequency": (frequency, "Hz", "Natural frequency"),
+        "damping_ratio": (ratio, "1", "Damping ratio"),
+    }
+    over = ("mode", "speed")
     return xr.Dataset(
-        {
-            "frequency": (
-                ("mode", "speed"),
-                [[mode.frequency for mode in track] for track in tracks],
-                {"units": "Hz", "long_name": "Natural frequency"},
-            ),
-            "damping_ratio": (
-                ("mode", "speed"),
-                [[mode.damping_ratio for mode in track] for track in tracks],
-                {"units": "1", "long_name": "Damping ratio"},
-            ),
-            "whirl": (("mode", "speed"), [[mode.whirl for mode in track] for track in tracks]),
-        },
+        columns(over, of_modes) | {"whirl": (over, whirl)},
         coords={
             "kind": ("mode", [track[0].kind for track in tracks]),
-            "speed": (
-                "speed",
-                np.asarray(speeds, dtype=float),
-                {"units": "rad s-1", "long_name": "Spin speed"},
-            ),
+            "speed": ("speed", np.asarray(speeds, dtype=float), described("rad s-1", "Spin speed")),
         },
     )
 

@@ -168,11 +168,8 @@ def dry_whirl(
     )
     _add_columns(found, "threshold", thresholds)
     _add_columns(found, "whirl", whirls)
-    found["whirl_growth_rate"] = (
-        "whirl",
-        [row["growth_rate"] for row in whirls],
-        described("s-1", "Growth rate"),
-    )
+    rates = [row["growth_rate"] for row in whirls]
+    found["whirl_growth_rate"] = "whirl", rates, described("s-1", "Growth rate")
     number, w, needed = np.concatenate(curve, axis=1)
     found["curve_stator"] = "point", number.astype(int)
     found["curve_frequency"] = "point", w, described("rad s-1", "Whirl frequency")

@@ -11,7 +11,12 @@ import xarray as xr
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble, model_at
 from rubhpc.fem.critical_speeds import CriticalSpeed, campbell, find_critical_speeds, follow_modes
-from rubhpc.fem.response import check_response_node, first_lateral_frequency, response_nodes
+from rubhpc.fem.response import (
+    check_response_node,
+    first_lateral_frequency,
+    lateral_at_nodes,
+    response_nodes,
+)
 from rubhpc.fem.separation_margin import (
     amplitude_over_speed,
     grid_through,
@@ -20,7 +25,7 @@ from rubhpc.fem.separation_margin import (
 )
 from rubhpc.fem.stability import logarithmic_decrement, threshold_speed
 from rubhpc.rig.rotors import Rotor
-from rubhpc.schema import described
+from rubhpc.schema import columns, described
 from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
@@ -171,46 +176,38 @@ def _positions(rig: Rig, model: Model) -> xr.Dataset:
 
 
 def _sag(model: Model, speeds: NDArray[np.float64]) -> xr.Dataset:
-    nodes = response_nodes(model)
-    sag = np.stack([model_at(model, float(speed)).sag for speed in speeds])
-    columns = {}
-    for name, direction in (("v", "vertical"), ("w", "horizontal")):
-        rows = np.array([model.rotor.index(node, name) for node in nodes])
-        values = np.where(rows >= 0, sag[:, rows], 0.0)
-        columns[f"sag_{direction}"] = (("speed", "node"), values, described("m", f"Static sag, {direction}"))
-    return xr.Dataset(columns, coords={"node": nodes})
+    sag = lateral_at_nodes(model, np.stack([model_at(model, float(speed)).sag for speed in speeds]))
+    parts = {
+        f"sag_{direction}": (sag[:, i], "m", f"Static sag, {direction}")
+        for i, direction in enumerate(("vertical", "horizontal"))
+    }
+    return xr.Dataset(columns(("speed", "node"), parts), coords={"node": response_nodes(model)})
 
 
 def _critical(model: Model, critical: Sequence[CriticalSpeed]) -> xr.Dataset:
     nodes = response_nodes(model)
-    shapes = np.zeros((len(critical), len(nodes), 2), dtype=np.complex128)
+    shapes = np.zeros((len(critical), 2, len(nodes)), dtype=np.complex128)
     for i, found in enumerate(critical):
-        for i_direction, name in enumerate(("v", "w")):
-            rows = np.array([model.rotor.index(node, name) for node in nodes])
-            shapes[i, :, i_direction] = np.where(rows >= 0, found.mode.shape[rows], 0.0)
+        shapes[i] = lateral_at_nodes(model, found.mode.shape)
         shapes[i] /= np.abs(shapes[i]).max() or 1.0
     parts = np.stack([shapes.real, shapes.imag], axis=-1)
-    along = ("critical", "node", "part")
     modes = [found.mode for found in critical]
+    values = {
+        "critical_speed": ([found.speed for found in critical], "rad s-1", "Critical speed"),
+        "critical_damping_ratio": ([mode.damping_ratio for mode in modes], "1"),
+        "excitation": ([found.excitation for found in critical], "1"),
+    }
+    of_nodes = {
+        "shape_vertical": (parts[:, 0], "1", "Mode shape, vertical"),
+        "shape_horizontal": (parts[:, 1], "1", "Mode shape, horizontal"),
+    }
+    words = {
+        "critical_mode": ("critical", [found.number for found in critical]),
+        "critical_whirl": ("critical", np.array([mode.whirl for mode in modes], dtype=str)),
+        "is_excited": ("critical", np.array([found.is_excited for found in critical], dtype=bool)),
+    }
     return xr.Dataset(
-        {
-            "critical_speed": (
-                "critical",
-                [found.speed for found in critical],
-                described("rad s-1", "Critical speed"),
-            ),
-            "critical_mode": ("critical", [found.number for found in critical]),
-            "critical_whirl": ("critical", np.array([mode.whirl for mode in modes], dtype=str)),
-            "critical_damping_ratio": (
-                "critical",
-                [mode.damping_ratio for mode in modes],
-                described("1", ""),
-            ),
-            "excitation": ("critical", [found.excitation for found in critical], described("1", "")),
-            "is_excited": ("critical", np.array([found.is_excited for found in critical], dtype=bool)),
-            "shape_vertical": (along, parts[:, :, 0], described("1", "Mode shape, vertical")),
-            "shape_horizontal": (along, parts[:, :, 1], described("1", "Mode shape, horizontal")),
-        },
+        words | columns("critical", values) | columns(("critical", "node", "part"), of_nodes),
         coords={"node": nodes, "part": ["real", "imaginary"]},
     )
 
@@ -223,7 +220,7 @@ def _peaks(
 ) -> xr.Dataset:
     found = [(n, peak) for n in nodes for peak in response_peaks(amplitude_over_speed(model, n), grid)]
     peaks = [peak for _, peak in found]
-    columns = {
+    about = {
         "peak_speed": ([peak.speed for peak in peaks], "rad s-1", "Speed of the peak"),
         "peak_amplitude": ([peak.amplitude for peak in peaks], "m", "Amplitude of the peak"),
         "lower_half_power_speed": ([peak.half_power_speeds[0] for peak in peaks], "rad s-1", "N1"),
@@ -233,11 +230,9 @@ def _peaks(
     if operating is not None:
         margins = [peak.separation_margin(operating) for peak in peaks]
         required = [peak.required_margin(operating) for peak in peaks]
-        columns["separation_margin"] = (margins, "1", "Separation margin")
-        columns["required_margin"] = (required, "1", "Separation margin required by API 617")
-    table = xr.Dataset(
-        {name: ("peak", v, described(unit, title)) for name, (v, unit, title) in columns.items()}
-    )
+        about["separation_margin"] = (margins, "1", "Separation margin")
+        about["required_margin"] = (required, "1", "Separation margin required by API 617")
+    table = xr.Dataset(columns("peak", about))
     table["peak_node"] = ("peak", np.array([node for node, _ in found], dtype=int))
     if operating is not None:
         separated = [peak.is_separated(operating) for peak in peaks]

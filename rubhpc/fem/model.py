@@ -141,13 +141,7 @@ class Body:
 
     @property
     def tabulated_speeds(self) -> list[float]:
-        """Speeds of all tables of its bearings within the range that they share, rad/s; none without tables.
-
-        Raises
-        ------
-        InputError
-            When the tables share no range.
-        """
+        """Speeds of its bearings' tables within the range that they share, rad/s; none without tables."""
         supports = self.by_speed.supports if self.by_speed else ()
         if not supports:
             return []
@@ -163,6 +157,12 @@ class Body:
     def n_dof(self) -> int:
         """Number of free degrees of freedom."""
         return len(self.degrees)
+
+    @property
+    def total_mass(self) -> float:
+        """Of a rotor, kg: what moves with it when it is lifted."""
+        upright = [row for row, (_, name) in enumerate(self.degrees) if name == "v"]
+        return float(self.mass[np.ix_(upright, upright)].sum())
 
     @cached_property
     def part(self) -> NDArray[np.int64]:
@@ -397,13 +397,7 @@ MOST_DEGREES = 3000  # of freedom of a rig: its matrices are dense, 72 MB each
 
 @contextmanager
 def computable(part: str) -> Iterator[None]:
-    """Report a number that overflows while a part of a rig is assembled.
-
-    Raises
-    ------
-    InputError
-        Names the part.
-    """
+    """Report a number that overflows while a part of a rig is assembled."""
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is found in the matrices
             yield

@@ -14,6 +14,8 @@ from rubhpc.fem.modes import KINDS, modes, undamped_modes
 from rubhpc.fem.statics import sag_at_stators
 
 if TYPE_CHECKING:
+    from typing import Any
+
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Body, Model
@@ -48,14 +50,8 @@ def steady_response(model: Model, spin: float) -> NDArray[np.complex128]:
     response = np.zeros(rotor.n_dof, dtype=np.complex128)
     if spin == 0.0:
         return response
-    dynamic = rotor.dynamic_stiffness(spin, spin)[block]
     force = spin**2 * (model.unbalance_cosine - 1j * model.unbalance_sine)[lateral]
-    try:
-        response[lateral] = np.linalg.solve(dynamic, force)
-    except np.linalg.LinAlgError:
-        raise InputError(
-            f"speed {spin:.6g} rad/s: the undamped rotor resonates without bound; give it damping"
-        ) from None
+    response[lateral] = _solved(rotor.dynamic_stiffness(spin, spin)[block], force, f"speed {spin:.6g} rad/s")
     return response
 
 
@@ -85,12 +81,14 @@ def harmonic_response(
         If that is a natural frequency of an undamped rotor.
     """
     dynamic = model.rotor.at(spin).dynamic_stiffness(order * spin, spin)
+    return _solved(dynamic, force, f"order {order:g} of speed {spin:.6g} rad/s")
+
+
+def _solved(dynamic: NDArray[np.complex128], force: NDArray[Any], where: str) -> NDArray[np.complex128]:
     try:
         return np.asarray(np.linalg.solve(dynamic, force))
     except np.linalg.LinAlgError:
-        raise InputError(
-            f"order {order:g} of speed {spin:.6g} rad/s: the undamped rotor resonates; give it damping"
-        ) from None
+        raise InputError(f"{where}: the undamped rotor resonates without bound; give it damping") from None
 
 
 def steady_lines(model: Model, spin: float) -> dict[int, NDArray[np.complex128]]:
@@ -209,6 +207,13 @@ def _spectral_radius(body: Body) -> float:
 def response_nodes(model: Model) -> list[int]:
     """Nodes of the rotor that move sideways, rising."""
     return sorted({node for node, name in model.rotor.degrees if name in ("v", "w")})
+
+
+def lateral_at_nodes(model: Model, values: NDArray[Any]) -> NDArray[Any]:
+    """Return v and w of all `response_nodes`, (..., 2, n_node), from values (..., n_dof) of the rotor."""
+    nodes = response_nodes(model)
+    rows = np.array([[model.rotor.index(node, name) for node in nodes] for name in ("v", "w")])
+    return np.where(rows >= 0, values[..., rows], 0.0)
 
 
 def check_response_node(model: Model, node: int, where: str = "node") -> None:

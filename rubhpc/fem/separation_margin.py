@@ -18,7 +18,7 @@ import numpy as np
 import xarray as xr
 from scipy.optimize import brentq, minimize_scalar
 
-from rubhpc.fem.response import contact_free_amplitude, response_nodes, steady_response
+from rubhpc.fem.response import contact_free_amplitude, lateral_at_nodes, response_nodes, steady_response
 from rubhpc.schema import described
 
 if TYPE_CHECKING:
@@ -64,10 +64,8 @@ def unbalance_response(
     `v + i w = F exp(i spin t) + conj(B) exp(-i spin t)`, a forward and a backward circle; the semi-axes are
     |F| + |B| and |F| - |B|.
     """
-    nodes = response_nodes(model)
-    rows = np.array([[model.rotor.index(node, name) for name in ("v", "w")] for node in nodes])
     response = np.stack([steady_response(model, float(speed)) for speed in speeds])
-    v, w = np.moveaxis(np.where(rows >= 0, response[:, rows], 0.0), -1, 0)
+    v, w = np.moveaxis(lateral_at_nodes(model, response), -2, 0)
     forward, backward = np.abs(v + 1j * w) / 2, np.abs(v - 1j * w) / 2
     seen = np.stack([v * math.cos(angle) + w * math.sin(angle) for angle in probes], axis=-1)
     phase = np.full(seen.shape, np.nan)  # where nothing moves there is none
@@ -83,7 +81,7 @@ def unbalance_response(
         },
         coords={
             "speed": ("speed", np.asarray(speeds, dtype=np.float64), described("rad s-1", "Spin speed")),
-            "node": ("node", nodes, {"long_name": "Node of the rotor"}),
+            "node": ("node", response_nodes(model), {"long_name": "Node of the rotor"}),
             "probe": ("probe", np.asarray(probes, dtype=np.float64), described("rad", "Angle of the probe")),
         },
     )
@@ -154,26 +152,10 @@ class ResponsePeak:
         return self.separation_margin(operating) >= self.required_margin(operating)
 
 
-def amplitude_over_speed(model: Model, node: int, probe: float | None = None) -> Callable[[float], float]:
-    """Return the function that gives the amplitude at a node, m, for a spin (rad/s).
-
-    Parameters
-    ----------
-    model : Model
-    node : int
-    probe : float, optional
-        Angle of a displacement probe, rad; by default the major semi-axis of the orbit.
-    """
-    if probe is None:
-        unbalanced = replace(model, harmonics=())
-        return lambda spin: contact_free_amplitude(unbalanced, spin, node)
-    along, across = math.cos(probe), math.sin(probe)
-
-    def amplitude(spin: float) -> float:
-        v, w = model.rotor.at_node(node, steady_response(model, spin))
-        return float(abs(along * v + across * w))
-
-    return amplitude
+def amplitude_over_speed(model: Model, node: int) -> Callable[[float], float]:
+    """Return the function that gives the major semi-axis of a node's orbit, m, for a spin (rad/s)."""
+    unbalanced = replace(model, harmonics=())
+    return lambda spin: contact_free_amplitude(unbalanced, spin, node)
 
 
 def grid_through(low: float, high: float, critical: Sequence[CriticalSpeed] = ()) -> NDArray[np.float64]:

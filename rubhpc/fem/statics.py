@@ -48,11 +48,6 @@ def at_rest_under(body: Body, load: Floats, spin: float) -> tuple[Floats, Floats
 
     The sag is that of the dynamic coefficients, `K sag = load`, or, where bearings state the static position
     of their journals, `K sag = load + film` with the forces (n_dof,) on the journals that hold them there.
-
-    Raises
-    ------
-    InputError
-        When the loaded part of the body is unconstrained.
     """
     sag = sag_under(body, load)
     if body.by_speed is None:

@@ -50,7 +50,6 @@ def _(stator: Stator, radius: float) -> StatorModel:
         (M, alpha * M + beta * K, K),
         tuple(degrees[row] for row in free),
         tip=tip,
-        gyroscopic=beam.gyroscopic[rows],
         length=stator.length,
         euler_load=stator.euler_load,
         squared_slope=stator_foreshortening(stator)[rows] if stator.is_bent else None,
@@ -94,7 +93,6 @@ def _model(
     degrees: tuple[tuple[int, str], ...],
     *,
     tip: int = 1,
-    gyroscopic: Matrix | None = None,
     length: float = math.inf,
     euler_load: float = math.inf,
     squared_slope: Matrix | None = None,
@@ -105,7 +103,7 @@ def _model(
     body = Body(
         mass=mass,
         damping=damping,
-        gyroscopic=np.zeros_like(mass) if gyroscopic is None else gyroscopic,
+        gyroscopic=np.zeros_like(mass),
         stiffness=stiffness,
         degrees=degrees,
     )

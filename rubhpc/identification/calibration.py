@@ -25,14 +25,13 @@ from postproc.signals.sensors import Sensor, sense
 from rubhpc.errors import InputError, writing
 from rubhpc.identification.candidates import settings_of, simulated
 from rubhpc.identification.comparison import log_likelihood
-from rubhpc.identification.evaluation import Shared
+from rubhpc.identification.evaluation import sharing
 from rubhpc.identification.interpolated import Interpolated
 from rubhpc.identification.lines import LineComparison
 from rubhpc.identification.nested import Alone, require_sampler, sample
 from rubhpc.identification.priors import at_shares
 from rubhpc.identification.problem import read_known, read_problem
 from rubhpc.recent import recent
-from rubhpc.running.ending import ended_together
 from rubhpc.schema import DONE
 from rubhpc.study.axes import SPEED_AXES
 from rubhpc.study.identity import PHYSICS
@@ -110,8 +109,7 @@ def calibrate_on(
     report: Callable[[str], None],
 ) -> list[Ranked]:
     """Return where the truths of trials lie; the other processes of the pool take part."""
-    with ended_together(pool):
-        shared = Shared(pool)
+    with sharing(pool) as shared:
         require_sampler()
         found: list[Ranked] = []
         by_draw = [list(some) for _, some in groupby(trials, lambda trial: trial.draw)]
@@ -119,7 +117,6 @@ def calibrate_on(
             report(f"{len(found)} of {len(trials)} posteriors")
             for some in shared.map(ranks_of, by_draw[at : at + pool.size]):
                 found += some
-        shared.close()
         return found
 
 
@@ -184,13 +181,8 @@ def _likelihood(problem: Problem, known: Known) -> Callable[[Floats], float]:
         if features.serves(comparison.measured):
             return lambda shares: log_likelihood(comparison, features(shares))
 
-    def by_case(shares: Floats) -> float:
-        try:
-            return problem.rub.log_likelihood(problem.rub.outcome(at_shares(known.priors, shares).tolist()))
-        except Exception:  # as in a study, where such a case is marked as failed
-            return -math.inf
-
-    return by_case
+    rub = problem.rub
+    return lambda shares: rub.log_likelihood(rub.outcome(at_shares(known.priors, shares).tolist()))
 
 
 @lru_cache(maxsize=1)

@@ -23,9 +23,8 @@ from rubhpc.identification.comparison import Unknown, log_likelihood
 from rubhpc.integrate.case import run_case
 from rubhpc.recent import recent
 from rubhpc.rig.reading import with_keys
-from rubhpc.schema import DONE, PROBE
-from rubhpc.study import contact_axes, initial
-from rubhpc.study.axes import OWN, SPEED_AXES
+from rubhpc.schema import DONE, FAILED, PROBE
+from rubhpc.study.axes import OWN, SPEED_AXES, axis_table
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -93,10 +92,8 @@ def simulated(
     for name, value in settings.items():
         if name in OWN:
             given[name] = value
-        elif name.startswith(contact_axes.PREFIX):
-            given[name.removeprefix(contact_axes.PREFIX)] = value
-        elif name.startswith(initial.PREFIX):
-            start[name.removeprefix(initial.PREFIX)] = value
+        elif table := axis_table(name):
+            (given if table == "contact" else start)[name.removeprefix(f"{table}.")] = value
         else:
             overrides[name] = value
     case = case_of(
@@ -206,11 +203,15 @@ class Rub:
         return len(self.machine.study.rig.stator)
 
     def outcome(self, values: Sequence[float]) -> Outcome:
-        """Return what a case with these values gives."""
-        nothing = np.full(self.n_stator, math.nan)
-        record = self.machine.simulate(values)
-        if record.status != DONE:
-            return Outcome(record.status, None, nothing, nothing, nothing)
+        """Return what a case with these values gives; an error marks it as failed, as in a study."""
+        nothing = [np.full(self.n_stator, math.nan)] * 3
+        try:
+            record = self.machine.simulate(values)
+            return Outcome(record.status, None, *nothing) if record.status != DONE else self._of(record)
+        except Exception:
+            return Outcome(FAILED, None, *nothing)
+
+    def _of(self, record: Record) -> Outcome:
         measures = record.measures
         fraction, force, work = (
             np.asarray(measures[name], dtype=float)
@@ -277,7 +278,7 @@ class Misalignment(NoRub):
     def unknown(self, values: Sequence[float]) -> Unknown | None:
         """Return the forces and the torque, as lines in the channels of one weight of the rotor."""
         model, spin = self.model(values)
-        weight = _GRAVITY * mass_of(model)
+        weight = _GRAVITY * model.rotor.total_mass
         turning = {"v": (1.0, 1.0), "w": (-1j, 1j)}  # forward and backward
         bending = sorted({node for node, name in model.rotor.degrees if name == "thy"})  # no pedestals
         nodes = bending or response_nodes(model)
@@ -299,12 +300,6 @@ class Misalignment(NoRub):
 
 
 Hypothesis = Rub | NoRub
-
-
-def mass_of(model: Model) -> float:
-    """Return the mass of the rotor, kg."""
-    upright = [i for i, (_, name) in enumerate(model.rotor.degrees) if name == "v"]
-    return float(model.rotor.mass[np.ix_(upright, upright)].sum())
 
 
 def _is_of_rotor(name: str) -> bool:

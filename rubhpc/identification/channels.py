@@ -190,13 +190,7 @@ def channels_of(measured: xr.Dataset) -> Channels:
 
 
 def _slip(waves: Floats, n: int, where: str) -> float:
-    """Return the true speed over the one that was taken, by the place of the lines at 1X to 4X.
-
-    Raises
-    ------
-    InputError
-        There is no line near 1X.
-    """
+    """Return the true speed over the one that was taken, by the place of the lines at 1X to 4X."""
     size = np.maximum(waves.std(axis=1, keepdims=True), np.finfo(float).tiny)
     whole = waves / size * np.hanning(waves.shape[1])
     revolutions = waves.shape[1] / n

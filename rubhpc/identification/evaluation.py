@@ -2,31 +2,28 @@
 
 from __future__ import annotations
 
-import math
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
-import numpy as np
-
-from rubhpc.identification.candidates import Outcome
+from rubhpc.errors import RubError
 from rubhpc.identification.evaluated import Evaluated
 from rubhpc.identification.priors import at_shares
 from rubhpc.running.ending import ended_together
 from rubhpc.running.pool import connect, together
 from rubhpc.running.workers import start_workers
-from rubhpc.schema import FAILED
 from rubhpc.streams import lasting_streams
 from rubhpc.threads import on_one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Iterator
     from contextlib import AbstractContextManager
     from pathlib import Path
 
+    import numpy as np
     from numpy.typing import NDArray
 
-    from rubhpc.identification.candidates import Rub
+    from rubhpc.identification.candidates import Outcome, Rub
     from rubhpc.running.pool import Pool
     from rubhpc.running.stopping import Stopping
 
@@ -58,26 +55,21 @@ class Task:
 
 
 class Evaluator:
-    """Evaluates cases; those that fail are impossible."""
+    """Evaluates cases, each once."""
 
     def __init__(self, task: Task) -> None:
         self.rub = task.rub
         n_stator, n_value = task.rub.n_stator, len(task.rub.priors)
         like = task.rub.comparison.measured
         self.evaluated = Evaluated(task.folder, task.content, like, n_value, n_stator, task.rank)
-        self._nothing = np.full(n_stator, math.nan)
 
     def outcome(self, values: Floats) -> Outcome:
         """Return the outcome of a case, known or computed."""
         known = self.evaluated.of(values)
-        if known is not None:
-            return known
-        try:
-            found = self.rub.outcome(values.tolist())
-        except Exception:  # as in a study, where such a case is marked as failed
-            found = Outcome(FAILED, None, self._nothing, self._nothing, self._nothing)
-        self.evaluated.keep(values, found)
-        return found
+        if known is None:
+            known = self.rub.outcome(values.tolist())
+            self.evaluated.keep(values, known)
+        return known
 
 
 def use(task: Task) -> None:
@@ -127,14 +119,21 @@ class Shared:
             self._pool.from_first(lambda: None)
 
 
-def processes(workers: int) -> AbstractContextManager[Pool]:
-    """Return the processes of this run: the ranks of a launcher, or so many workers.
+@contextmanager
+def sharing(pool: Pool) -> Iterator[Shared]:
+    """Share work with the other processes of a pool; at the end they are let go."""
+    with ended_together(pool):
+        shared = Shared(pool)
+        try:
+            yield shared
+        except RubError:
+            shared.close()
+            raise
+        shared.close()
 
-    Raises
-    ------
-    InputError
-        A launcher has started several, and there are to be workers too.
-    """
+
+def processes(workers: int) -> AbstractContextManager[Pool]:
+    """Return the processes of this run: the ranks of a launcher, or so many workers."""
     if workers > 1:
         return start_workers(workers, take_part)
     return nullcontext(connect())

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 from rubhpc.errors import RubError, writing
 from rubhpc.identification.candidates import Rub
 from rubhpc.identification.evaluation import (
-    Shared,
     Task,
     current_likelihood,
     current_values,
     evaluator,
+    sharing,
     take_part,
 )
 from rubhpc.identification.nested import MOST, Alone, require_sampler, sample
@@ -23,7 +23,6 @@ from rubhpc.identification.posterior import Found, tree_of
 from rubhpc.identification.priors import at_shares
 from rubhpc.identification.problem import read_problem
 from rubhpc.identification.words import in_words
-from rubhpc.running.ending import ended_together
 from rubhpc.running.pool import Pool
 from rubhpc.running.workers import start_workers
 from rubhpc.streams import lasting_streams
@@ -38,6 +37,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.identification.candidates import Hypothesis, NoRub
+    from rubhpc.identification.evaluation import Shared
     from rubhpc.identification.nested import Sampled
     from rubhpc.identification.problem import Problem
 
@@ -143,28 +143,21 @@ def identify_on(
     report: Callable[[str], None],
 ) -> Identification:
     """Return on the first rank what `identify` returns; the others take part (`evaluation.take_part`)."""
-    with ended_together(pool):
-        shared = Shared(pool)
-        try:
-            found = _identify(shared, read(), output, live, draws, seed, report)
-        except RubError:
-            shared.close()
-            raise
-        shared.close()
-        return found
+    with sharing(pool) as shared:
+        problem = read()
+        require_sampler()
+        return _identify(shared, problem, None if output is None else Path(output), live, draws, seed, report)
 
 
 def _identify(
     shared: Shared,
     problem: Problem,
-    output: str | PathLike[str] | None,
+    folder: Path | None,
     live: int,
     draws: int,
     seed: int,
     report: Callable[[str], None],
 ) -> Identification:
-    require_sampler()
-    folder = None if output is None else Path(output)
     if folder is not None:
         with writing(folder, "--output"):
             (folder / CASES).mkdir(parents=True, exist_ok=True)
@@ -174,7 +167,7 @@ def _identify(
             report(f"{rub.name}: {n_call} cases, ln(evidence) {log_evidence:.1f}, {left:.3g} to come")
 
         # Kernels are compiled once, and what is wrong with the study is reported, before all processes begin.
-        rub.outcome([prior.at(0.5) for prior in rub.priors])
+        rub.machine.simulate([prior.at(0.5) for prior in rub.priors])
         shared.use(Task(rub=rub, folder=folder and folder / CASES, content=problem.content(rub)))
         return sample(
             current_likelihood,

@@ -63,10 +63,7 @@ class Interpolated:
             self.error = np.max(apart, axis=0)
 
     def _case(self, shares: Floats) -> Seen | None:
-        try:
-            return self._rub.outcome(at_shares(self._rub.priors, shares).tolist()).seen
-        except Exception:  # as in a study, where such a case is marked as failed
-            return None
+        return self._rub.outcome(at_shares(self._rub.priors, shares).tolist()).seen
 
     def serves(self, measured: Seen) -> bool:
         """Whether the error does not count beside the noise of a record."""

@@ -104,11 +104,6 @@ def sample(
         Evaluations a live point, after which the sampling is ended.
     say : callable
         Called with the number of evaluations, the logarithm of the evidence, and how much is left of it.
-
-    Raises
-    ------
-    InputError
-        No case is possible.
     """
     if n_value == 0:
         only = likelihood(np.zeros(0))

@@ -11,7 +11,7 @@ import numpy as np
 from rubhpc.errors import InputError
 from rubhpc.input.messages import place
 from rubhpc.input.quantity import parse_quantity
-from rubhpc.study.axes import meanings_of
+from rubhpc.study.axes import stated
 from rubhpc.study.axis_reading import NORMAL_KEYS, declared_axis, make_axis, make_range
 
 if TYPE_CHECKING:
@@ -76,8 +76,7 @@ class Prior:
 
     def as_given(self, value: float) -> float | str:
         """Return a value as an argument of a case takes it: of a choice its word."""
-        words = meanings_of(self.name)
-        return words[int(value)] if words else value
+        return stated(self.name, value)
 
 
 def at_shares(priors: Sequence[Prior], shares: Floats) -> Floats:
@@ -98,11 +97,6 @@ def read_prior(name: str, value: Any, rig: Rig, file: str) -> Prior:
     value : dict or list
         `{start, stop}` is uniform, with `scale = "log"` log-uniform; `{mean, std}` is normal; values of a
         list are equally likely, and so are the whole numbers from `start` to `stop` of a node.
-
-    Raises
-    ------
-    InputError
-        The key is unknown, or the table is no such distribution.
     """
     where = place(file, "grid", name)
     declared = declared_axis(name, rig, where)

@@ -23,11 +23,10 @@ from rubhpc.identification.priors import is_prior, read_prior
 from rubhpc.identification.slack import slack_bearings
 from rubhpc.input.messages import place
 from rubhpc.input.reading import read_toml
-from rubhpc.rig.reading import read_rig
 from rubhpc.study.axes import SPEED_AXES
 from rubhpc.study.axis_reading import flatten
 from rubhpc.study.identity import PHYSICS
-from rubhpc.study.study import line_of_text, overridden, study_of, table_of
+from rubhpc.study.study import rig_of, study_of, table_of
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -107,22 +106,13 @@ class Known(NamedTuple):
 
 
 def read_known(study: str | PathLike[str], *, trust_rig: bool = False) -> Known:
-    """Return what a study file says of a machine before the measurement.
-
-    Raises
-    ------
-    InputError
-        Nothing is open, or the study cannot be identified.
-    """
+    """Return what a study file says of a machine before the measurement."""
     source = Path(study)
     table, name = read_toml(source), str(study)
     for key, reason in _REFUSED.items():
         if key in table:
             raise InputError(f"{place(name, key)}: {reason}; remove [{key}]")
-    rig = read_rig(
-        line_of_text(table, "rig", "", name), source.parent, place(name, "", "rig"), trust_rig=trust_rig
-    )
-    rig = overridden(rig, table_of(table, "override", name), name)
+    rig = rig_of(table, source, trust_rig=trust_rig)
     grid = dict(flatten(table_of(table, "grid", name)))
     priors = tuple(read_prior(key, value, rig, name) for key, value in grid.items() if is_prior(value))
     if not priors:
@@ -152,11 +142,6 @@ def read_problem(
         Whether slack bearings are tried too.
     trust_rig : bool
         Whether a rig that is Python code may be run.
-
-    Raises
-    ------
-    InputError
-        A file cannot be read or used; its text says what to do.
     """
     known = read_known(study, trust_rig=trust_rig)
     data = file if isinstance(file, xr.Dataset) else measured(file)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from rubhpc.fem.assemble import assemble, model_at
 from rubhpc.fem.response import contact_free_amplitude
-from rubhpc.identification.candidates import Machine, Rub, mass_of
+from rubhpc.identification.candidates import Machine, Rub
 from rubhpc.identification.priors import read_prior
 from rubhpc.rig.normal_law import NormalLaw
 from rubhpc.rig.parts import Bearing
@@ -48,7 +48,7 @@ def slack_bearings(machine: Machine, comparison: Comparison) -> Iterator[Rub]:
     model = model_at(assemble(rig), spin)
     deflection = max(contact_free_amplitude(model, spin), machine.channels.deflection)
     # The equilibrium without the wall, where a march begins, has to be within what counts as divergence.
-    least = mass_of(model) * rig.rotor.gravity / (_SAG * rig.rotor.displacement_limit)
+    least = model.rotor.total_mass * rig.rotor.gravity / (_SAG * rig.rotor.displacement_limit)
     own = [prior for prior in machine.priors if prior.name.startswith("rotor.")]
     own = [prior for prior in own if not prior.name.startswith("rotor.bearing.")]
     stators = [replace(one, clearance_offset=_AWAY) for one in rig.stator]

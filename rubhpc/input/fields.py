@@ -6,6 +6,7 @@ import dataclasses
 import operator
 from contextlib import suppress
 from dataclasses import MISSING, field
+from functools import partial
 from numbers import Integral
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from rubhpc.errors import InputError, printable
 from rubhpc.input.matrix import encode_matrix, parse_matrix
 from rubhpc.input.messages import brief, nearest, place, quoted
-from rubhpc.input.quantity import WithUnit, out_of_range, parse_quantity
+from rubhpc.input.quantity import WithUnit, example_of, out_of_range, parse_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -162,10 +163,6 @@ def _parse_words(value: object, limits: Limits, where: str) -> tuple[str, ...]:
     return tuple(value)
 
 
-def _parse_matrix(value: object, _: Limits, where: str) -> Any:
-    return parse_matrix(value, where)
-
-
 def _parse_degrees(value: object, _: Limits, where: str) -> tuple[tuple[int, str], ...]:
     fix = 'write a node and a name for each row, [[1, "v"], [1, "w"]]'
     try:
@@ -262,14 +259,6 @@ def _encode_quantity(value: float | str) -> float | str:
     return value if isinstance(value, str) else float(value)
 
 
-def _encode_degrees(value: Any) -> list[list[Any]]:
-    return [list(degree) for degree in value]
-
-
-def _encode_pairs(value: Any) -> dict[str, float]:
-    return {repr(float(key)): float(number) for key, number in value}
-
-
 KINDS = {
     "quantity": Kind(_parse_quantity, _check_quantity, encode=_encode_quantity),
     "series": Kind(_parse_series, _check_series, encode=list),
@@ -279,11 +268,11 @@ KINDS = {
     "choice": Kind(_parse_text, _check_choice),
     "choices": Kind(_parse_choices, _check_choices, encode=list),
     "words": Kind(_parse_words, encode=list),
-    "criteria": Kind(_parse_criteria, _check_criteria, encode=_encode_degrees),
+    "criteria": Kind(_parse_criteria, _check_criteria, encode=lambda value: [list(pair) for pair in value]),
     "selection": Kind(_parse_selection, encode=dict),
-    "pairs": Kind(_parse_pairs, encode=_encode_pairs),
-    "matrix": Kind(_parse_matrix, encode=encode_matrix),
-    "degrees": Kind(_parse_degrees, encode=_encode_degrees),
+    "pairs": Kind(_parse_pairs, encode=lambda value: {repr(float(a)): float(b) for a, b in value}),
+    "matrix": Kind(lambda value, _, where: parse_matrix(value, where), encode=encode_matrix),
+    "degrees": Kind(_parse_degrees, encode=lambda value: [list(degree) for degree in value]),
 }
 
 
@@ -301,11 +290,33 @@ class FieldError(InputError):
         return InputError(f"{place(file, '.'.join(p for p in (table, *inner) if p), key)}: {self.problem}")
 
 
+def _declare(kind: str, *, doc: str, example: str, default: Any = MISSING, **limits: Any) -> Any:
+    """Declare a field of a kind.
+
+    Parameters
+    ----------
+    doc, example : str
+        Meaning in one line; a value as in a TOML file, `'"0.8 m"'`; for messages and the reference of keys.
+    """
+    return field(default=default, metadata={"kind": kind, "doc": doc, "example": example, **limits})
+
+
+flag = partial(_declare, "flag")  # true or false
+text = partial(_declare, "text")  # one line of text
+choices = partial(_declare, "choices")  # some words among `of`, each at most once
+words = partial(_declare, "words")  # a list of words
+criteria = partial(_declare, "criteria")  # `flags`, and `measures` with a tolerance: pairs, with 0 for a flag
+selection = partial(_declare, "selection", default=(), added=True)  # pairs of an axis and a value
+pairs = partial(_declare, "pairs", default=())  # numbers in two `units`, as a table `{ 31.56 = 0.09 }`
+matrix = partial(_declare, "matrix")  # square, (n_dof, n_dof), SI units
+degrees = partial(_declare, "degrees")  # node and name of every row of a matrix
+
+
 def quantity(
     unit: str,
     *,
     doc: str,
-    example: str,
+    example: str = "",
     default: Any = MISSING,
     above: float | None = None,
     at_least: float | None = None,
@@ -319,8 +330,7 @@ def quantity(
     Parameters
     ----------
     doc, example : str
-        Meaning in one line; a value as in a TOML file, `'"0.8 m"'`; for messages and the reference of keys,
-        as in all declarations below.
+        As of any field (`_declare`); the example is by default that of the unit.
     or_unit : str
         Another unit that the number may have, as another key says; text keeps its unit (`WithUnit`).
     added : bool
@@ -328,93 +338,35 @@ def quantity(
     """
     limits = {"above": above, "at_least": at_least, "below": below, "or_words": or_words, "added": added}
     other = {"or_unit": or_unit} if or_unit else {}
-    return _declare("quantity", doc, example, default, unit=unit, **limits, **other)
+    example = example or example_of(unit)
+    return _declare("quantity", doc=doc, example=example, default=default, unit=unit, **limits, **other)
 
 
-def series(
-    unit: str, *, doc: str, example: str, default: Any = MISSING, at_least: float | None = None
-) -> Any:
+def series(unit: str, *, at_least: float | None = None, **declared: Any) -> Any:
     """Declare a field that holds a tuple of finite numbers in `unit` (SI), none below a bound."""
-    bounds = {"above": None, "at_least": at_least, "below": None}
-    return _declare("series", doc, example, default, unit=unit, **bounds)
+    return _declare("series", unit=unit, above=None, at_least=at_least, below=None, **declared)
 
 
 def count(
     *,
-    doc: str,
-    example: str,
-    default: Any = MISSING,
     at_least: int = 1,
     at_most: int | None = None,
     is_key: bool = True,
     or_words: tuple[str, ...] = (),
     gone: Mapping[str, str] = MappingProxyType({}),
+    **declared: Any,
 ) -> Any:
     """Declare a field that holds a bounded whole number, or one of some words; a study may set a key.
 
     `gone` are words of older versions, with what a message says of each.
     """
-    bounds = {"at_least": at_least, "at_most": at_most, "or_words": or_words, "gone": gone}
-    return _declare("count", doc, example, default, is_key=is_key, **bounds)
+    bounds: Any = {"at_least": at_least, "at_most": at_most, "or_words": or_words, "gone": gone}
+    return _declare("count", is_key=is_key, **bounds, **declared)
 
 
-def flag(*, doc: str, example: str, default: bool) -> Any:
-    """Declare a field that is true or false."""
-    return _declare("flag", doc, example, default)
-
-
-def text(*, doc: str, example: str, default: Any = MISSING) -> Any:
-    """Declare a field that holds one line of text."""
-    return _declare("text", doc, example, default)
-
-
-def choice(
-    *, of: tuple[str, ...], doc: str, example: str, default: str | None, absent: str | None = None
-) -> Any:
+def choice(*, of: tuple[str, ...], absent: str | None = None, **declared: Any) -> Any:
     """Declare a field that holds one word of a list; `absent`: what it means that a stored rig lacks it."""
-    return _declare("choice", doc, example, default, of=of, added=absent is not None, absent=absent)
-
-
-def choices(*, of: tuple[str, ...], doc: str, example: str, default: tuple[str, ...]) -> Any:
-    """Declare a field that holds some words of a list, each at most once."""
-    return _declare("choices", doc, example, default, of=of)
-
-
-def words(*, doc: str, example: str, default: tuple[str, ...]) -> Any:
-    """Declare a field that holds a list of words."""
-    return _declare("words", doc, example, default)
-
-
-def criteria(
-    *, flags: tuple[str, ...], measures: tuple[str, ...], doc: str, example: str, default: Any = MISSING
-) -> Any:
-    """Declare a field that holds flags, and measures with a tolerance: pairs, with 0 for a flag."""
-    return _declare("criteria", doc, example, default, flags=flags, measures=measures)
-
-
-def selection(*, doc: str, example: str) -> Any:
-    """Declare a field that holds pairs of an axis and a value, `{ friction = 0.3 }`; none by default."""
-    return _declare("selection", doc, example, (), added=True)
-
-
-def pairs(units: tuple[str, str], *, doc: str, example: str) -> Any:
-    """Declare a field that holds pairs of numbers, written as a table `{ 31.56 = 0.09 }`; none by default."""
-    return _declare("pairs", doc, example, (), units=units)
-
-
-def matrix(*, doc: str, example: str, default: Any = MISSING) -> Any:
-    """Declare a field that holds a square matrix, (n_dof, n_dof), SI units."""
-    return _declare("matrix", doc, example, default)
-
-
-def degrees(*, doc: str, example: str) -> Any:
-    """Declare a field that holds a node and a name for every row of a matrix."""
-    return _declare("degrees", doc, example, MISSING)
-
-
-def key_of(declared: dataclasses.Field[Any]) -> str:
-    """Return the key of a field in a file: its name, without the underscore that keeps `from_` a name."""
-    return declared.name.rstrip("_")
+    return _declare("choice", of=of, added=absent is not None, absent=absent, **declared)
 
 
 def table(*, doc: str, default: Any = MISSING, added: bool = False) -> Any:
@@ -425,8 +377,9 @@ def table(*, doc: str, default: Any = MISSING, added: bool = False) -> Any:
     return field(default=default, metadata={"doc": doc, "added": added})
 
 
-def _declare(kind: str, doc: str, example: str, default: Any, **limits: Any) -> Any:
-    return field(default=default, metadata={"kind": kind, "doc": doc, "example": example, **limits})
+def key_of(declared: dataclasses.Field[Any]) -> str:
+    """Return the key of a field in a file: its name, without the underscore that keeps `from_` a name."""
+    return declared.name.rstrip("_")
 
 
 def parse_field(declared: dataclasses.Field[Any], value: object, where: str) -> Any:
@@ -435,13 +388,7 @@ def parse_field(declared: dataclasses.Field[Any], value: object, where: str) -> 
 
 
 def check_fields(owner: Any) -> None:
-    """Refuse values that the declarations of a dataclass exclude; call it in `__post_init__`.
-
-    Raises
-    ------
-    FieldError
-        Names the field, what is wrong and how to fix it.
-    """
+    """Refuse values that the declarations of a dataclass exclude; call it in `__post_init__`."""
     for declared in dataclasses.fields(owner):
         value = getattr(owner, declared.name)
         problem = check_value(declared, value)

@@ -43,6 +43,13 @@ _EXAMPLES = {
     "rad": '"90 deg"',
     "rad/s": '"1800 rpm"',
     "Hz": '"31.56 Hz"',
+    "N/m": '"1e6 N/m"',
+    "N s/m": '"100 N s/m"',
+    "N m/rad": '"5e3 N m/rad"',
+    "N m s/rad": '"5 N m s/rad"',
+    "kg m^2": '"0.01 kg m^2"',
+    "kg*m^2": '"0.01 kg m^2"',
+    "kg/m^3": "7800.0",
     "": "0.3",
 }
 
@@ -174,16 +181,16 @@ def _angles(units: Any) -> float:
     return float(root._units.get("radian", 0))
 
 
-def example(unit: str) -> str:
+def example_of(unit: str) -> str:
     """Return how a value of that unit may be written in a file."""
     return _EXAMPLES.get(unit) or f'"1.5 {unit}"'
 
 
 def _fix(unit: str) -> str:
     return (
-        f"write a number ({unit}) or text such as {example(unit)}"
+        f"write a number ({unit}) or text such as {example_of(unit)}"
         if unit
-        else f"write a number such as {example(unit)}"
+        else f"write a number such as {example_of(unit)}"
     )
 
 
@@ -218,11 +225,6 @@ def read_range(table: Mapping[str, object], unit: str, where: str) -> list[float
         SI unit of plain numbers.
     where : str
         Start of error messages.
-
-    Raises
-    ------
-    InputError
-        When the table is not a range, or has too many values.
     """
     fix = "write { start, stop, step } or { start, stop, num }"
     start, stop = _start_and_stop(table, unit, where, RANGE_KEYS, fix)
@@ -246,13 +248,7 @@ def read_range(table: Mapping[str, object], unit: str, where: str) -> list[float
 
 
 def read_ends(table: Mapping[str, object], unit: str, where: str) -> Range:
-    """Return the range of `{start, stop}` or `{start, stop, scale}` that values are to be drawn from.
-
-    Raises
-    ------
-    InputError
-        When it is not such a range.
-    """
+    """Return the range of `{start, stop}` or `{start, stop, scale}` that values are to be drawn from."""
     for key in ("step", "num"):
         if key in table:
             problem = f"{key}: a sample is drawn from start to stop"

@@ -64,11 +64,6 @@ def build(cls: type[T], table: object, file: str, name: str = "") -> T:
         As TOML gives it.
     file, name : str
         Start of error messages: the file, and the dotted name of the table in it.
-
-    Raises
-    ------
-    InputError
-        When a key is unknown or missing, or a value is invalid.
     """
     if not isinstance(table, dict):
         raise InputError(
@@ -200,13 +195,7 @@ _SETTABLE = ("quantity", "count", "flag", "choice")  # kinds of fields that one 
 
 
 def find_key(owner: object, dotted: str) -> dataclasses.Field[Any]:
-    """Return the field that a dotted key names.
-
-    Raises
-    ------
-    InputError
-        When there is no such key; the message names the nearest.
-    """
+    """Return the field that a dotted key names."""
     current: Any = owner
     declared = None
     for part in dotted.split("."):
@@ -235,11 +224,6 @@ def replace_keys(owner: T, values: Mapping[str, object]) -> T:
 
     A dataclass that can give one thing in two ways has a method `displaced(keys)`, which returns the changes
     of other fields when those in `keys` are set.
-
-    Raises
-    ------
-    InputError
-        When a key is unknown or a value is invalid.
     """
     parsed = {}
     for dotted, value in values.items():

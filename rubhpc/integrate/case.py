@@ -63,7 +63,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.periodic_motions.collocated_motion import FollowedMotion
     from rubhpc.integrate.setup import Setup
     from rubhpc.kernels.accumulators import Samples
-    from rubhpc.study.study import Recording
+    from rubhpc.study.tables import Recording
 
     Floats = NDArray[np.float64]
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.marches.march import March
     from rubhpc.integrate.record import State
     from rubhpc.integrate.setup import Setup
-    from rubhpc.study.study import Recording
+    from rubhpc.study.tables import Recording
 
     Floats = NDArray[np.float64]
 

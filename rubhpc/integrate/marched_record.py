@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
 from rubhpc.integrate.measuring.samples import empty_samples, new_accumulator
+from rubhpc.kernels.accumulators import EXTREMA, SUMMED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -15,14 +14,6 @@ if TYPE_CHECKING:
     from rubhpc.integrate.record import State
     from rubhpc.integrate.setup import Setup
     from rubhpc.kernels.accumulators import Accumulator, Samples
-
-
-_SUMMED = (
-    *("n_contact", "contact_time", "impulse", "stick_time", "friction_work", "energy", "reversals"),
-    "turned",
-)
-_LARGEST = ("highest", "peak_force", "peak_lateral", "pivots", "residual")
-_EXTREMA = dict.fromkeys(_LARGEST, np.maximum) | dict.fromkeys(("lowest", "least_slip"), np.minimum)
 
 
 class Marched(NamedTuple):
@@ -53,9 +44,9 @@ def joined_sums(parts: Sequence[Accumulator]) -> Accumulator:
     """Return sums and extrema of the parts of a record, in place of those of the last one."""
     sums = parts[-1]
     for part in parts[:-1]:
-        for name in _SUMMED:
+        for name in SUMMED:
             getattr(sums, name)[:] += getattr(part, name)
-        for name, extreme in _EXTREMA.items():
+        for name, extreme in EXTREMA.items():
             total = getattr(sums, name)
             extreme(total, getattr(part, name), out=total)
     return sums

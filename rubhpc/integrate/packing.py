@@ -14,14 +14,15 @@ from scipy.sparse.csgraph import connected_components
 from rubhpc.fem.statics import sag_at_stators
 from rubhpc.kernels._jit import plain
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, N_DEGREE, TORSION, Pairs, V, W, rim_sense
-from rubhpc.kernels.laws import FRICTION_LAWS, MULTIPLIER, NORMAL_LAWS, Law
+from rubhpc.kernels.laws import MULTIPLIER, Law
 from rubhpc.kernels.linear import Linear
+from rubhpc.models import FRICTION_LAWS, NORMAL_LAWS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
-    from rubhpc.study.study import Contact
+    from rubhpc.study.contact_keys import Contact
 
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rubhpc.rig.stators import AnyStator
-    from rubhpc.study.study import Contact, Integrator
+    from rubhpc.study.contact_keys import Contact
+    from rubhpc.study.tables import Integrator
 
 
 class Scheme(Enum):

@@ -37,8 +37,9 @@ if TYPE_CHECKING:
     from rubhpc.kernels.laws import Law
     from rubhpc.rig.probes import Probe
     from rubhpc.rig.rig import Rig
+    from rubhpc.study.contact_keys import Contact
     from rubhpc.study.drive_law import DriveLaw
-    from rubhpc.study.study import Contact, Integrator
+    from rubhpc.study.tables import Integrator
 
     Floats = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from rubhpc.integrate.marches.march import March
     from rubhpc.kernels.accumulators import Accumulator, Samples
-    from rubhpc.study.study import Recording
+    from rubhpc.study.tables import Recording
 
     Floats = NDArray[np.float64]
 

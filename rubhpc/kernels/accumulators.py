@@ -56,6 +56,16 @@ class Accumulator(Struct):
     residual: Floats  # (3, 2), largest deviation from the laws, displacement by the forces: indices below
 
 
+# How the parts of a record are joined: these are added, of the others the extreme value is kept.
+SUMMED = (
+    *("n_contact", "contact_time", "impulse", "stick_time", "friction_work", "energy", "reversals"),
+    "turned",
+)
+EXTREMA: dict[str, np.ufunc] = dict.fromkeys(
+    ("highest", "peak_force", "peak_lateral", "pivots", "residual"), np.maximum
+)
+EXTREMA |= dict.fromkeys(("lowest", "least_slip"), np.minimum)
+
 UNBALANCE_WORK, DRIVE_WORK, DAMPING_LOSS, FRICTION_LOSS, IMPACT_LOSS, RUB_WORK = range(6)
 
 # Contact problems: gaps of a step, m; velocities of an impact, m/s; accelerations after it, m/s2.
@@ -63,12 +73,14 @@ STEP, IMPACT, PRESSING = range(3)
 
 
 @linked
-def observe_rub(drive: float, loss: float, accumulator: Accumulator) -> None:
-    """Add the work of the drive against friction, the frictional loss, and the difference, J.
+def observe_rub(i: int, impulse: float, drive: float, loss: float, accumulator: Accumulator) -> None:
+    """Add an impulse of pair i, N s, the work of the drive against its friction, and the frictional loss, J.
 
     `RUB_WORK` is a sum of differences. The difference of the two sums would carry their rounding errors,
     which grow with all the friction work of a rotor that stands and rubs.
     """
+    accumulator.impulse[i] += impulse
+    accumulator.friction_work[i] += loss
     accumulator.energy[DRIVE_WORK] += drive
     accumulator.energy[FRICTION_LOSS] += loss
     accumulator.energy[RUB_WORK] += drive - loss
@@ -155,12 +167,10 @@ def observe_contact(
             accumulator.stick_time[i] += step
         elif slip != 0.0:
             observe_sense(i, 1 if slip > 0.0 else -1, accumulator)
-        accumulator.impulse[i] += force * step
-        accumulator.friction_work[i] += friction_force * slip * step
         accumulator.least_slip[i] = min(accumulator.least_slip[i], slip)
         observe_force(i, begin, step, force * step, force, force, accumulator)
         drive = friction_force * pairs.radius[i] * abs(spin) * step
-        observe_rub(drive, friction_force * slip * step, accumulator)
+        observe_rub(i, force * step, drive, friction_force * slip * step, accumulator)
         accumulator.energy[IMPACT_LOSS] -= force * opening * step
 
 

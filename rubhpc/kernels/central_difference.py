@@ -269,8 +269,7 @@ def observe_delays(row: Ints, work: Workspace, change: Floats, accumulator: Accu
                 moved = work.delay[i] * work.force[i] * change[row[i, a]]
                 opened += work.gap_jacobian[i, a] * moved
                 slipped -= (work.force_direction[i, a] - work.gap_jacobian[i, a]) * moved
-        accumulator.friction_work[i] += slipped
-        observe_rub(0.0, slipped, accumulator)
+        observe_rub(i, 0.0, 0.0, slipped, accumulator)
         accumulator.energy[IMPACT_LOSS] -= opened
 
 

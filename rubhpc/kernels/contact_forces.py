@@ -15,7 +15,7 @@ from rubhpc.kernels.contact_pairs import (
     pair_normal_and_gap,
 )
 from rubhpc.kernels.coulomb_friction import fill_slip, friction_residual, solve_friction
-from rubhpc.kernels.laws import gap_target, is_bouncing, is_penalty, is_set_valued, softness
+from rubhpc.kernels.laws import gap_target, is_bouncing, is_penalty, may_stick, softness
 
 GAP_TOLERANCE = 1e-14  # m, to which a closed gap is zero
 N_NEWTON = 25  # iterations for the curved gap; two or three are usual
@@ -25,7 +25,7 @@ MOST_RESIDUAL = 1e-6  # over the displacement by the forces; rounding leaves 1e-
 @jit
 def fill_compliances(pairs: Pairs, work: Workspace, step: float) -> None:
     """Fill the changes of gaps and slips by unit forces over a step; the directions are already filled."""
-    if is_set_valued(pairs.law):
+    if may_stick(pairs.law):
         fill_matrix(pairs, work.gap_jacobian, work.gap_jacobian, work.matrix)
         fill_matrix(pairs, work.gap_jacobian, work.friction_direction, work.coupling)
         fill_matrix(pairs, work.friction_direction, work.gap_jacobian, work.tangential[0])
@@ -59,11 +59,11 @@ def fill_residual(pairs: Pairs, work: Workspace) -> None:
         end = work.gap[i] - work.target[i]
         for j in range(pairs.radius.size):
             end += work.matrix[i, j] * work.force[j]
-            if is_set_valued(pairs.law):
+            if may_stick(pairs.law):
                 end += work.coupling[i, j] * work.traction[j]
         distance = max(distance, natural_residual(work.matrix[i, i], work.force[i], end))
         moved = max(moved, work.matrix[i, i] * work.force[i])
-        if is_set_valued(pairs.law):
+        if may_stick(pairs.law):
             slipped, held = friction_residual(work, i)
             distance, moved = max(distance, slipped), max(moved, held)
     work.solution[1], work.solution[2] = distance, moved
@@ -92,10 +92,10 @@ def solve_contact(pairs: Pairs, work: Workspace, step: float, spin: float) -> in
         fill_compliances(pairs, work, step)
     if is_penalty(law) or is_bouncing(law):
         fill_targets(pairs, work, step)
-    if is_set_valued(law):
+    if may_stick(law):
         fill_slip(pairs, work, step, spin)
     for _ in range(N_NEWTON):
-        if is_set_valued(law):
+        if may_stick(law):
             pivots = solve_friction(pairs, work, step, spin)
         else:
             for i in range(q):
@@ -118,7 +118,7 @@ def solve_contact(pairs: Pairs, work: Workspace, step: float, spin: float) -> in
                 linear = gap
                 for j in range(q):
                     linear -= work.matrix[i, j] * work.force[j]
-                    if is_set_valued(law):
+                    if may_stick(law):
                         linear -= work.coupling[i, j] * work.traction[j]
                 work.gap[i] = linear
                 gap -= work.target[i]

@@ -12,16 +12,13 @@ import numpy as np
 
 from rubhpc.kernels._jit import linked
 from rubhpc.kernels._struct import Struct
+from rubhpc.models import FRICTION_LAWS, NORMAL_LAWS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# In a study; their places are the numbers below.
-FRICTION_LAWS = ("sliding", "coulomb", "stribeck", "table")
-SLIDING, COULOMB, STRIBECK, TABLE = range(4)
-NORMAL_LAWS = ("lagrange", "penalty", "hertz")
-LAGRANGE, PENALTY, HERTZ = range(3)
-
+SLIDING, COULOMB, STRIBECK, TABLE = range(len(FRICTION_LAWS))
+LAGRANGE, PENALTY, HERTZ = range(len(NORMAL_LAWS))
 
 _NO_TABLE = np.zeros(0)
 
@@ -44,14 +41,14 @@ MULTIPLIER = Law()
 
 
 @linked
-def is_set_valued(law: Law) -> bool:
+def may_stick(law: Law) -> bool:
     """Whether friction may stick and reverse, instead of steady sliding by the spin."""
     return law.friction_law != SLIDING
 
 
 @linked
 def friction_coefficient(law: Law, friction: float, slip_speed: float, is_sticking: bool) -> float:
-    """Largest friction for a unit normal force.
+    """Largest friction for a unit normal force; of a pair that sticks where it depends on the slip, at rest.
 
     Parameters
     ----------
@@ -62,13 +59,13 @@ def friction_coefficient(law: Law, friction: float, slip_speed: float, is_sticki
     is_sticking : bool
         Whether the pair stuck in the step before.
     """
-    if is_sticking and not is_varied(law):
+    if is_sticking and not depends_on_slip(law):
         return friction * law.static_friction_ratio
     return sliding_friction(law, friction, slip_speed)[0]
 
 
 @linked
-def is_varied(law: Law) -> bool:
+def depends_on_slip(law: Law) -> bool:
     """Whether the coefficient of friction depends on the slip speed."""
     return law.friction_law != SLIDING and law.friction_law != COULOMB
 
@@ -105,7 +102,7 @@ def is_bouncing(law: Law) -> bool:
 @linked
 def is_plain(law: Law) -> bool:
     """Whether gaps are closed by multipliers under steady sliding: forces then follow from the gaps alone."""
-    return not (is_penalty(law) or is_bouncing(law) or is_set_valued(law))
+    return not (is_penalty(law) or is_bouncing(law) or may_stick(law))
 
 
 @linked

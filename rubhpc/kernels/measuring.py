@@ -129,14 +129,12 @@ def observe_step(
         friction_work = reduced.friction[i] * work * step / 6.0
         samples.force[i, i_sample] += impulse * share
         accumulator.contact_time[i] += step
-        accumulator.impulse[i] += impulse
-        accumulator.friction_work[i] += friction_work
         accumulator.least_slip[i] = min(accumulator.least_slip[i], slip_before, slip_after)
         if slip_after != 0.0:
             observe_sense(i, 1 if slip_after > 0.0 else -1, accumulator)
         observe_force(i, begin, step, impulse, before, after, accumulator)
         drive = reduced.friction[i] * reduced.radius[i] * abs(spin) * impulse
-        observe_rub(drive, friction_work, accumulator)
+        observe_rub(i, impulse, drive, friction_work, accumulator)
         accumulator.energy[DAMPING_LOSS] += drive - friction_work
 
 

@@ -190,8 +190,6 @@ def observe_impact(
         gain = (total - closing - 0.5 * change) / reduced.friction[i]  # of the slip over the rim's own speed
         slip = reduced.radius[i] * abs(spin) - gain
         accumulator.least_slip[i] = min(accumulator.least_slip[i], slip, slip - change / reduced.friction[i])
-    accumulator.impulse[i] += impulse
     friction_work = drive - (total - closing) * impulse
-    accumulator.friction_work[i] += friction_work
-    observe_rub(drive, friction_work, accumulator)
+    observe_rub(i, impulse, drive, friction_work, accumulator)
     accumulator.energy[IMPACT_LOSS] -= closing * impulse

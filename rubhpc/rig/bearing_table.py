@@ -12,7 +12,7 @@ import numpy as np
 from rubhpc.errors import InputError
 from rubhpc.input.fields import FieldError, choice, count, series
 from rubhpc.rig.parts import Bearing
-from rubhpc.rig.supports import Support, check_pairs
+from rubhpc.rig.supports import COEFFICIENTS, Support
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -52,6 +52,8 @@ class BearingTable(Support):
         Monotone cubic (F. N. Fritsch, J. Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300-304), which passes
         through every value and overshoots none; or straight lines.
     """
+
+    BOTH = Support.BOTH | COEFFICIENTS
 
     link: int | None = count(
         doc="Other node of a bearing between two nodes; only in rotors given by matrices.",
@@ -114,8 +116,6 @@ class BearingTable(Support):
             if isinstance(values, tuple) and len(values) not in (1, len(self.speed)):
                 problem = f"{len(values)} values for {len(self.speed)} speeds"
                 raise FieldError(declared.name, f"{problem}; give one for each speed, or a single number")
-        for one, letter in (("stiffness", "k"), ("damping", "c")):
-            check_pairs(self, one, tuple(f"{letter}{pair}" for pair in PAIRS))
         if self.stiffness is None and (self.kyy is None or self.kzz is None):
             key = "kyy" if self.kyy is None else "kzz"
             raise FieldError(key, "missing; a table has either stiffness, or kyy and kzz")

@@ -24,39 +24,22 @@ class Carrier:
         "N/m", doc="Stiffness of its support in both lateral directions.", example='"2e7 N/m"', above=0
     )
     horizontal_stiffness: float | None = quantity(
-        "N/m",
-        doc="Horizontal stiffness of its support; by default `stiffness`.",
-        example='"1e7 N/m"',
-        default=None,
-        above=0,
+        "N/m", doc="Horizontal stiffness of its support; by default `stiffness`.", default=None, above=0
     )
     damping: float = quantity(
-        "N s/m",
-        doc="Damping of its support in both lateral directions.",
-        example='"400 N s/m"',
-        default=0.0,
-        at_least=0,
+        "N s/m", doc="Damping of its support in both lateral directions.", default=0.0, at_least=0
     )
     inertia: float | None = quantity(
         "kg m^2",
         doc="Moment of inertia about the shaft, without the stators; by default the carrier does not turn.",
-        example='"0.3 kg m^2"',
         default=None,
         above=0,
     )
     torsional_stiffness: float | None = quantity(
-        "N m/rad",
-        doc="Torsional stiffness of its support; needs an inertia.",
-        example='"5e5 N m/rad"',
-        default=None,
-        above=0,
+        "N m/rad", doc="Torsional stiffness of its support; needs an inertia.", default=None, above=0
     )
     torsional_damping: float = quantity(
-        "N m s/rad",
-        doc="Torsional damping of its support; needs an inertia.",
-        example='"5 N m s/rad"',
-        default=0.0,
-        at_least=0,
+        "N m s/rad", doc="Torsional damping of its support; needs an inertia.", default=0.0, at_least=0
     )
 
     def __post_init__(self) -> None:

@@ -3,24 +3,51 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rubhpc.input.fields import FieldError, check_fields, choice, quantity
 from rubhpc.input.quantity import WithUnit
+from rubhpc.models import NORMAL_LAWS
 
-LAWS = ("lagrange", "penalty", "hertz")
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
 UNITS = {"stiffness": ("N/m", "N/m^1.5"), "damping": ("N*s/m", "s/m")}  # of a penalty, of Hertz's law
-_EXAMPLES = {"penalty": "1e8", "hertz": '"1e10 N/m^1.5"'}
+# By key: the laws that have it, and why others do not.
+NEEDS_LAW = {
+    "stiffness": (("penalty", "hertz"), "a multiplier has none"),
+    "damping": (("penalty", "hertz"), "a multiplier has none"),
+    "restitution": (("lagrange",), "the rebound of a spring law comes from its spring and damper"),
+}
+NEEDED = {"penalty": {"stiffness": "1e8"}, "hertz": {"stiffness": '"1e10 N/m^1.5"'}}  # with examples
+
+
+def check_keys(
+    owner: Any,
+    kind: str,
+    needs: Mapping[str, tuple[tuple[str, ...], str]],
+    needed: Mapping[str, Mapping[str, str]],
+) -> None:
+    """Refuse keys that are not those of a law, which the key `kind` names, and its absence of others."""
+    law = getattr(owner, kind)
+    for key, (laws, reason) in needs.items():
+        if getattr(owner, key) is not None and law not in laws:
+            raise FieldError(key, f'{reason}; set {kind} = "{laws[0]}", or leave it out')
+    for key, example in needed.get(law, {}).items():
+        if getattr(owner, key) is None:
+            raise FieldError(key, f'missing; {kind} = "{law}" needs one, such as {key} = {example}')
+
+
+def check_spring(owner: Any, kind: str) -> None:
+    """Refuse what is no law of the normal force, which the key `kind` names; turn its units into numbers."""
+    check_keys(owner, kind, NEEDS_LAW, NEEDED)
+    take_units(owner, getattr(owner, kind), kind)
+    if owner.restitution is not None and owner.restitution > 1:
+        raise FieldError("restitution", f"{owner.restitution:g} is out of range; it must be at most 1")
 
 
 def take_units(owner: Any, law: str, key_of_law: str) -> None:
-    """Turn stiffness and damping of a frozen dataclass, given with units, into numbers.
-
-    Raises
-    ------
-    FieldError
-        When the unit belongs to another law.
-    """
+    """Turn stiffness and damping of a frozen dataclass, given with units of its law, into numbers."""
     for key, units in UNITS.items():
         given, unit = getattr(owner, key), units[law == "hertz"]
         if isinstance(given, WithUnit):
@@ -72,7 +99,7 @@ class NormalLaw:
     kind: str = choice(
         doc="Contact law, as `law` of the study: multipliers, a spring and damper, or Hertz's law.",
         example='"penalty"',
-        of=LAWS,
+        of=NORMAL_LAWS,
         default="lagrange",
     )
     stiffness: float | None = stiffness_key()
@@ -81,16 +108,4 @@ class NormalLaw:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        if self.kind == "lagrange":
-            for key in UNITS:
-                if getattr(self, key) is not None:
-                    raise FieldError(key, 'a multiplier has none; set kind = "penalty", or leave it out')
-        elif self.restitution is not None:
-            problem = "a penalty's rebound comes from its spring and damper"
-            raise FieldError("restitution", f'{problem}; set kind = "lagrange", or leave it out')
-        elif self.stiffness is None:
-            fix = f"such as stiffness = {_EXAMPLES[self.kind]}"
-            raise FieldError("stiffness", f'missing; kind = "{self.kind}" needs one, {fix}')
-        if self.restitution is not None and self.restitution > 1:
-            raise FieldError("restitution", f"{self.restitution:g} is out of range; it must be at most 1")
-        take_units(self, self.kind, "kind")
+        check_spring(self, "kind")

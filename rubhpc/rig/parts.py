@@ -1,25 +1,23 @@
-"""The parts of a rotor: shaft sections, sleeves, discs, bearings, the torsional drive, damping.
-
-A part that can give one thing in two ways has a method `displaced`, which returns the changes of other fields
-when some are set.
-"""
+"""The parts of a rotor: shaft sections, sleeves, discs, bearings, the torsional drive, damping."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, ClassVar
 
 from rubhpc.input.fields import FieldError, check_fields, count, flag, pairs, quantity
-from rubhpc.rig.supports import Placed, Springs, Support
+from rubhpc.rig.supports import Part, Placed, Springs, Support
 
 
 @dataclass(frozen=True, kw_only=True)
-class Tube:
+class Tube(Part):
     """A cylinder or a cone with a bore, of Timoshenko elements.
 
     It is tapered where a diameter at its right end is given: diameters change linearly along it.
     """
+
+    EITHER: ClassVar[tuple[tuple[str, str], ...]] = (("shear_modulus", "poissons_ratio"),)
 
     length: float = quantity("m", doc="Length.", example='"0.8 m"', above=0)
     outer_diameter: float = quantity(
@@ -53,12 +51,11 @@ class Tube:
     poissons_ratio: float | None = quantity(
         "",
         doc="Poisson's ratio, in place of the shear modulus E / (2 (1 + nu)).",
-        example="0.3",
         default=None,
         above=-1,
         below=0.5,
     )
-    density: float = quantity("kg/m^3", doc="Density.", example="7800.0", above=0)
+    density: float = quantity("kg/m^3", doc="Density.", above=0)
     shear: bool = flag(
         doc="Whether it deforms in shear (Timoshenko beam); false for a Rayleigh beam.",
         example="true",
@@ -66,7 +63,7 @@ class Tube:
     )
 
     def __post_init__(self) -> None:
-        check_fields(self)
+        super().__post_init__()
         if self.shear_modulus is not None and self.poissons_ratio is not None:
             problem = "conflicts with shear_modulus, which is E / (2 (1 + nu))"
             raise FieldError("poissons_ratio", f"{problem}; give one of the two")
@@ -95,11 +92,6 @@ class Tube:
         assert self.poissons_ratio is not None
         return self.youngs_modulus / (2 * (1 + self.poissons_ratio))
 
-    def displaced(self, keys: set[str]) -> dict[str, Any]:
-        """Return the changes of other fields when `keys` are set."""
-        both = ("shear_modulus", "poissons_ratio")
-        return {other: None for key, other in (both, both[::-1]) if key in keys}
-
 
 MOST_ELEMENTS = 200  # of a shaft or a stator: matrices are dense, and time grows with the third power
 
@@ -115,7 +107,7 @@ class Damping:
         "s", doc="Stiffness-proportional coefficient.", example='"20 us"', default=0.0, at_least=0
     )
     ratios: tuple[tuple[float, float], ...] = pairs(
-        ("Hz", ""),
+        units=("Hz", ""),
         doc="Damping ratios at given frequencies (Hz = fraction of critical), in place of alpha and beta.",
         example="{ 31.56 = 0.09, 128.05 = 0.022 }",
     )
@@ -155,20 +147,14 @@ class Sleeve(Tube, Placed):
     Its node or position is that of its left end; its right end is at a node too.
     """
 
+    EITHER: ClassVar = (*Tube.EITHER, *Placed.EITHER)
+
     inner_diameter: float = quantity(
         "m",
         doc="Diameter of the bore, at least that of the shaft; of a tapered sleeve at its left end.",
         example='"20 mm"',
         above=0,
     )
-
-    def __post_init__(self) -> None:
-        Placed.__post_init__(self)
-        Tube.__post_init__(self)
-
-    def displaced(self, keys: set[str]) -> dict[str, Any]:
-        """Return the changes of other fields when `keys` are set."""
-        return Placed.displaced(self, keys) | Tube.displaced(self, keys)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -188,7 +174,7 @@ class Disc(Placed):
     thickness: float | None = quantity(
         "m", doc="Thickness along the shaft.", example='"0.03 m"', default=None, above=0
     )
-    density: float | None = quantity("kg/m^3", doc="Density.", example="7800.0", default=None, above=0)
+    density: float | None = quantity("kg/m^3", doc="Density.", default=None, above=0)
     mass: float | None = quantity(
         "kg",
         doc="Mass, given with both inertias in place of thickness and density.",
@@ -197,10 +183,10 @@ class Disc(Placed):
         at_least=0,
     )
     diametral_inertia: float | None = quantity(
-        "kg m^2", doc="Moment of inertia about a diameter.", example="2.58e-3", default=None, at_least=0
+        "kg m^2", doc="Moment of inertia about a diameter.", default=None, at_least=0
     )
     polar_inertia: float | None = quantity(
-        "kg m^2", doc="Moment of inertia about the shaft axis.", example="4.76e-3", default=None, at_least=0
+        "kg m^2", doc="Moment of inertia about the shaft axis.", default=None, at_least=0
     )
 
     def __post_init__(self) -> None:
@@ -263,14 +249,10 @@ class Torsion:
     fixed_node: int | None = count(doc="Node whose torsion the drive constrains.", example="1", default=None)
     node: int = count(doc="Node of the spring to ground.", example="1", default=1)
     stiffness: float | None = quantity(
-        "N m/rad",
-        doc="Torsional spring to ground, in place of fixed_node.",
-        example="5e3",
-        default=None,
-        above=0,
+        "N m/rad", doc="Torsional spring to ground, in place of fixed_node.", default=None, above=0
     )
     damping: float = quantity(
-        "N m s/rad", doc="Torsional damper parallel to the spring.", example="0.1", default=0.0, at_least=0
+        "N m s/rad", doc="Torsional damper parallel to the spring.", default=0.0, at_least=0
     )
     free: bool = flag(doc="Whether the shaft is unconstrained in torsion.", example="true", default=False)
 

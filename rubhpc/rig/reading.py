@@ -34,11 +34,6 @@ def call_rig_function(path: Path, function: str, where: str) -> Any:
     """Call a function of a Python file without arguments and return its result.
 
     Its folder is first on the module search path meanwhile, as for a script.
-
-    Raises
-    ------
-    InputError
-        When there is no such file or function, or it raises; the message names the line.
     """
     named = place(f"{where}: {path}" if where else str(path))
     if not path.is_file():

@@ -29,13 +29,7 @@ if TYPE_CHECKING:
 
 
 def check_carriers(carriers: Sequence[AnyCarrier], stators: Sequence[AnyStator]) -> None:
-    """Refuse carriers without stators, stators on carriers that are not there, and those that cannot follow.
-
-    Raises
-    ------
-    FieldError
-        Names the carrier or stator.
-    """
+    """Refuse carriers without stators, and stators on none that is there, or that cannot follow."""
     names = [carrier.name for carrier in carriers]
     for i, name in enumerate(names, 1):
         if names.count(name) > 1:
@@ -151,19 +145,17 @@ class Rig:
         if K is None:
             raise FieldError("K", "missing; give the stiffness matrix")
         table = {"mass": M, "damping": C, "stiffness": K, "gyroscopic": G}
-        declared = {f.name: f for f in fields(MatrixRotor)}
-        given: Any = {key: value for key, value in table.items() if value is not None}
-        rotor = MatrixRotor(
-            **given,
-            degrees=parse_field(declared["degrees"], degrees, "degrees"),
-            unbalance=_tuple(unbalance),
-            load=_tuple(load),
-            harmonic=_tuple(harmonic),
-            gravity=parse_quantity(gravity, "m/s^2", "gravity"),
-            clearance_from=parse_field(declared["clearance_from"], clearance_from, "clearance_from"),
-            output_node=output_node,
-            displacement_limit=displacement_limit,
+        given = _parsed(
+            "",
+            degrees=degrees,
+            unbalance=unbalance,
+            load=load,
+            harmonic=harmonic,
+            gravity=gravity,
+            clearance_from=clearance_from,
         )
+        given |= {key: value for key, value in table.items() if value is not None}
+        rotor = MatrixRotor(**given, output_node=output_node, displacement_limit=displacement_limit)
         return cls(name=name, rotor=rotor, stator=_tuple(stators), carrier=_tuple(carriers))
 
     @classmethod
@@ -225,17 +217,10 @@ class Rig:
         """
         at = None if speed is None else parse_quantity(speed, "rad/s", "from_ross: speed")
         found = rotor_from_ross(rotor, speed=at, torsion=torsion, unbalance=_tuple(unbalance))
-        declared = {f.name: f for f in fields(MatrixRotor)}
-        found = replace(
-            found,
-            load=_tuple(load),
-            harmonic=_tuple(harmonic),
-            gravity=parse_quantity(gravity, "m/s^2", "from_ross: gravity"),
-            clearance_from=parse_field(
-                declared["clearance_from"], clearance_from, "from_ross: clearance_from"
-            ),
-            output_node=output_node,
+        given = _parsed(
+            "from_ross: ", load=load, harmonic=harmonic, gravity=gravity, clearance_from=clearance_from
         )
+        found = replace(found, **given, output_node=output_node)
         return cls(name=name, rotor=found, stator=_tuple(stators), carrier=_tuple(carriers))
 
     def contact_radius(self, stator: AnyStator) -> float | None:
@@ -253,6 +238,17 @@ class Rig:
         """Return the rig as plain dicts, lists, numbers and text, for JSON."""
         result: dict[str, Any] = plain(self.with_geometry(default_of("geometry")))
         return result
+
+
+def _parsed(where: str, **given: Any) -> dict[str, Any]:
+    """Fields of a rotor of matrices, its tables as tuples."""
+    declared = {f.name: f for f in fields(MatrixRotor)}
+    return {
+        key: parse_field(declared[key], value, f"{where}{key}")
+        if "kind" in declared[key].metadata
+        else _tuple(value)
+        for key, value in given.items()
+    }
 
 
 def _tuple(parts: Any) -> tuple[Any, ...]:

@@ -48,12 +48,6 @@ def rotor_from_ross(
     torsion : Torsion
         Torsional boundary condition, which a ROSS rotor lacks.
     unbalance : sequence of Unbalance
-
-    Raises
-    ------
-    InputError
-        When it is not such a rotor, its shafts turn at different speeds, or a bearing depends on something
-        that its table cannot hold.
     """
     if not all(callable(getattr(rotor, name, None)) for name in "MCKG"):
         raise InputError(f"from_ross: {type(rotor).__name__} is not a ross.Rotor; pass one")

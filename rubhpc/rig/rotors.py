@@ -41,11 +41,9 @@ if TYPE_CHECKING:
 class Unbalance(Placed):
     """A mass at a radius, fixed to the rotor."""
 
-    mass: float = quantity("kg", doc="Unbalance mass.", example='"8 g"', at_least=0)
+    mass: float = quantity("kg", doc="Unbalance mass.", at_least=0)
     radius: float = quantity("m", doc="Distance of the mass from the axis.", example='"4.5 cm"', at_least=0)
-    phase: float = quantity(
-        "rad", doc="Angle from +y towards +z at time zero.", example='"90 deg"', default=0.0
-    )
+    phase: float = quantity("rad", doc="Angle from +y towards +z at time zero.", default=0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,9 +64,7 @@ class Harmonic(Placed):
 
     order: int = count(at_least=1, doc="Multiple of the spin speed.", example="2")
     force: float = quantity("N", doc="Size of the force.", example='"50 N"', at_least=0)
-    phase: float = quantity(
-        "rad", doc="Angle from +y towards +z at time zero.", example='"90 deg"', default=0.0
-    )
+    phase: float = quantity("rad", doc="Angle from +y towards +z at time zero.", default=0.0)
 
 
 UNLOADED, STANDSTILL = "unloaded", "standstill"

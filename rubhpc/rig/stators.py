@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, TypeAlias
+from typing import ClassVar, TypeAlias
 
 import numpy as np  # noqa: TC002 - annotations are read when a rig is built
 from numpy.typing import NDArray  # noqa: TC002
 
 from rubhpc.input.fields import (
     FieldError,
-    check_fields,
     choice,
     count,
     flag,
@@ -27,6 +26,7 @@ from rubhpc.models import LINEAR, SECOND_ORDER, default_of
 from rubhpc.rig.matrix_body import check_body, checked_matrices
 from rubhpc.rig.normal_law import NormalLaw
 from rubhpc.rig.parts import MOST_ELEMENTS, UNDAMPED, Damping
+from rubhpc.rig.supports import Part
 from rubhpc.units import typed_quantity
 
 MOST_STATORS = 62  # a contact mode is numbered by the bits of an integer
@@ -34,7 +34,7 @@ KINDS = {"beam": "Stator", "lumped": "LumpedStator", "matrix": "MatrixStator", "
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Seat:
+class Seat(Part):
     """Position of a stator, or of a ring of `count` stators, the first one at `angle`."""
 
     KIND: ClassVar[str] = ""
@@ -47,9 +47,7 @@ class Seat:
         default=None,
     )
     node: int = count(doc="Node of the rotor that the stator faces, from 1.", example="8")
-    angle: float = quantity(
-        "rad", doc="Angle from straight up (+y) towards +z.", example='"90 deg"', default=0.0
-    )
+    angle: float = quantity("rad", doc="Angle from straight up (+y) towards +z.", default=0.0)
     radius: float | None = quantity(
         "m",
         doc="Contact radius; by default that of the largest disc at the node.",
@@ -92,7 +90,7 @@ class Seat:
     )
 
     def __post_init__(self) -> None:
-        check_fields(self)
+        super().__post_init__()
         law: object = self.law
         if isinstance(law, dict):  # as in a file
             object.__setattr__(self, "law", build(NormalLaw, law, type(self).__name__, "law"))
@@ -146,10 +144,8 @@ class Stator(Seat):
     elements: int = count(
         doc="Number of equal finite elements.", example="6", default=6, at_most=MOST_ELEMENTS
     )
-    youngs_modulus: float = quantity("Pa", doc="Young's modulus.", example='"3 GPa"', above=0)
-    poissons_ratio: float = quantity(
-        "", doc="Poisson's ratio.", example="0.3", default=0.3, above=-1, below=0.5
-    )
+    youngs_modulus: float = quantity("Pa", doc="Young's modulus.", above=0)
+    poissons_ratio: float = quantity("", doc="Poisson's ratio.", default=0.3, above=-1, below=0.5)
     density: float = quantity("kg/m^3", doc="Density.", example="1157.0", above=0)
     lateral: bool = flag(
         doc="Whether the stator bends in the tangential direction.", example="true", default=True
@@ -226,27 +222,15 @@ class LumpedStator(Seat):
     mass: float | None = quantity(
         "kg", doc="Mass in the radial direction.", example='"0.5 g"', default=None, above=0
     )
-    stiffness: float | None = quantity(
-        "N/m", doc="Radial stiffness.", example='"1.9e6 N/m"', default=None, above=0
-    )
-    damping: float = quantity("N s/m", doc="Radial damping.", example='"2 N s/m"', default=0.0, at_least=0)
+    stiffness: float | None = quantity("N/m", doc="Radial stiffness.", default=None, above=0)
+    damping: float = quantity("N s/m", doc="Radial damping.", default=0.0, at_least=0)
     lateral_mass: float | None = quantity(
-        "kg",
-        doc="Mass in the tangential direction; by default `mass`.",
-        example='"0.5 g"',
-        default=None,
-        above=0,
+        "kg", doc="Mass in the tangential direction; by default `mass`.", default=None, above=0
     )
     lateral_stiffness: float | None = quantity(
-        "N/m",
-        doc="Tangential stiffness; without it the stator moves only radially.",
-        example='"1e4 N/m"',
-        default=None,
-        above=0,
+        "N/m", doc="Tangential stiffness; without it the stator moves only radially.", default=None, above=0
     )
-    lateral_damping: float = quantity(
-        "N s/m", doc="Tangential damping.", example='"0.1 N s/m"', default=0.0, at_least=0
-    )
+    lateral_damping: float = quantity("N s/m", doc="Tangential damping.", default=0.0, at_least=0)
     rigid: bool = flag(
         doc="Whether the stator is a rigid wall, without mass and stiffness.", example="true", default=False
     )
@@ -326,6 +310,7 @@ class Bore(Seat):
 
     KIND = "bore"
     REFUSED = ("angle", "count")
+    BOTH: ClassVar = {one: ((f"{one}_y", f"{one}_z"), ()) for one in ("stiffness", "damping")}
 
     mass: float | None = quantity(
         "kg", doc="Mass of the hole's body.", example='"2 kg"', default=None, above=0
@@ -333,29 +318,19 @@ class Bore(Seat):
     stiffness: float | None = quantity(
         "N/m",
         doc="Stiffness of its support in both lateral directions, in place of stiffness_y and stiffness_z.",
-        example='"1e7 N/m"',
         default=None,
         above=0,
     )
-    stiffness_y: float | None = quantity(
-        "N/m", doc="Vertical stiffness.", example='"1e7 N/m"', default=None, above=0
-    )
-    stiffness_z: float | None = quantity(
-        "N/m", doc="Horizontal stiffness.", example='"8e6 N/m"', default=None, above=0
-    )
+    stiffness_y: float | None = quantity("N/m", doc="Vertical stiffness.", default=None, above=0)
+    stiffness_z: float | None = quantity("N/m", doc="Horizontal stiffness.", default=None, above=0)
     damping: float | None = quantity(
         "N s/m",
         doc="Damping of its support in both directions, in place of damping_y and damping_z.",
-        example='"300 N s/m"',
         default=None,
         at_least=0,
     )
-    damping_y: float | None = quantity(
-        "N s/m", doc="Vertical damping.", example='"300 N s/m"', default=None, at_least=0
-    )
-    damping_z: float | None = quantity(
-        "N s/m", doc="Horizontal damping.", example='"300 N s/m"', default=None, at_least=0
-    )
+    damping_y: float | None = quantity("N s/m", doc="Vertical damping.", default=None, at_least=0)
+    damping_z: float | None = quantity("N s/m", doc="Horizontal damping.", default=None, at_least=0)
     rigid: bool = flag(
         doc="Whether the hole is fixed to the ground or to its carrier, without mass and stiffness.",
         example="true",
@@ -376,48 +351,28 @@ class Bore(Seat):
                 raise FieldError(key, "a bore surrounds the rotor and has none; remove it")
         if len(self.centre) != 2:
             raise FieldError("centre", 'not two numbers; write ["20 um", "-35 um"], up and across')
-        both = {one: (f"{one}_y", f"{one}_z") for one in ("stiffness", "damping")}
         if self.rigid:
-            for key in ("mass", *both, *both["stiffness"], *both["damping"]):
+            for key in ("mass", *self.BOTH, *(key for keys, _ in self.BOTH.values() for key in keys)):
                 if getattr(self, key) is not None:
                     raise FieldError(key, "conflicts with rigid = true, which does not move; remove one")
             return
         if self.mass is None:
             raise FieldError("mass", "missing; give mass and stiffness, or rigid = true")
-        for one, single in both.items():
-            given = [key for key in single if getattr(self, key) is not None]
-            if given and getattr(self, one) is not None:
-                problem = f"conflicts with {one}; give either {one} or {' and '.join(single)}"
-                raise FieldError(given[0], problem)
-            if len(given) == 1 or (one == "stiffness" and not given and self.stiffness is None):
-                missing = next(key for key in single if key not in given) if given else one
-                raise FieldError(missing, f"missing; give {one}, or {' and '.join(single)}")
+        for one, (single, _) in self.BOTH.items():
+            missing = [key for key in single if getattr(self, key) is None]
+            if len(missing) == 1 or (one == "stiffness" and missing and self.stiffness is None):
+                key = missing[0] if len(missing) == 1 else one
+                raise FieldError(key, f"missing; give {one}, or {' and '.join(single)}")
 
     @property
     def springs(self) -> tuple[float, float]:
         """Vertical and horizontal stiffness, N/m."""
-        return self._both("stiffness")
+        return self.straight("stiffness")
 
     @property
     def dampers(self) -> tuple[float, float]:
         """Vertical and horizontal damping, N s/m."""
-        return self._both("damping")
-
-    def _both(self, one: str) -> tuple[float, float]:
-        common = getattr(self, one) or 0.0
-        y, z = (getattr(self, f"{one}_{axis}") for axis in "yz")
-        return (common if y is None else y, common if z is None else z)
-
-    def displaced(self, keys: set[str]) -> dict[str, Any]:
-        """Return the changes of other fields when `keys` are set."""
-        changes: dict[str, Any] = {}
-        for one in ("stiffness", "damping"):
-            single = (f"{one}_y", f"{one}_z")
-            if one in keys and not keys & {*single}:
-                changes |= dict.fromkeys(single)
-            elif getattr(self, one) is not None and keys & {*single}:
-                changes |= dict.fromkeys(single, getattr(self, one)) | {one: None}
-        return changes
+        return self.straight("damping")
 
     @property
     def carrier_problem(self) -> str:
@@ -453,13 +408,7 @@ def gap_problem(stators: tuple[AnyStator, ...], clearance: float, *, is_ratio: b
 
 
 def single_stators(stators: tuple[AnyStator, ...]) -> tuple[AnyStator, ...]:
-    """Return stators with every ring replaced by its single stators.
-
-    Raises
-    ------
-    FieldError
-        When there are more than `MOST_STATORS`, or two stators of a ring coincide with others.
-    """
+    """Return stators with every ring replaced by its single stators."""
     if not any(stator.count for stator in stators):
         n_stator = len(stators)
         single = stators

@@ -1,16 +1,60 @@
-"""What bearings, seals and their pedestals share: a mass, springs and dampers in two lateral directions."""
+"""What bearings, seals, pedestals and bores share: a mass, springs and dampers in two lateral directions."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from rubhpc.input.fields import FieldError, check_fields, count, quantity, table
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Part:
+    """A part that can give one thing in two ways.
+
+    Attributes
+    ----------
+    EITHER : tuple of (key, key)
+        Of which one is given.
+    BOTH : dict
+        Keys for both lateral directions; in place of each, those of single ones: straight, then crossed.
+    """
+
+    EITHER: ClassVar[tuple[tuple[str, str], ...]] = ()
+    BOTH: ClassVar[dict[str, tuple[tuple[str, str], tuple[str, ...]]]] = {}
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        for one, (straight, crossed) in self.BOTH.items():
+            single = (*straight, *crossed)
+            for key in single:
+                if getattr(self, one) is not None and getattr(self, key) not in (None, 0.0):
+                    listed = f"{', '.join(single[:-1])} and {single[-1]}"
+                    raise FieldError(key, f"conflicts with {one}; give either {one} or {listed}")
+
+    def straight(self, one: str) -> tuple[float, float]:
+        """Return the vertical and the horizontal value of a key for both directions."""
+        common, (y, z) = getattr(self, one) or 0.0, (getattr(self, key) for key in self.BOTH[one][0])
+        return (common if y is None else y, common if z is None else z)
+
+    def displaced(self, keys: set[str]) -> dict[str, Any]:
+        """Return the changes of other fields when `keys` are set."""
+        changes: dict[str, Any] = {
+            other: None for a, b in self.EITHER for key, other in ((a, b), (b, a)) if key in keys
+        }
+        for one, (straight, crossed) in self.BOTH.items():
+            if one in keys and not keys & {*straight, *crossed}:
+                changes |= dict.fromkeys(straight) | dict.fromkeys(crossed, 0.0)
+            elif getattr(self, one) is not None and keys & {*straight, *crossed}:
+                changes |= dict.fromkeys(straight, getattr(self, one)) | {one: None}
+        return changes
+
+
 @dataclass(frozen=True, kw_only=True)
-class Placed:
+class Placed(Part):
     """A part at a node of the shaft, given by its number or by its position."""
+
+    EITHER: ClassVar[tuple[tuple[str, str], ...]] = (("node", "position"),)
 
     node: int | None = count(doc="Node of the rotor, from 1.", example="8", default=None)
     position: float | None = quantity(
@@ -22,20 +66,18 @@ class Placed:
     )
 
     def __post_init__(self) -> None:
-        check_fields(self)
+        super().__post_init__()
         if self.node is not None and self.position is not None:
             raise FieldError("position", "conflicts with node; give either node or position")
         if self.node is None and self.position is None:
             raise FieldError("node", "missing; give node, or position (m, from the left end of the shaft)")
 
-    def displaced(self, keys: set[str]) -> dict[str, Any]:
-        """Return the changes of other fields when `keys` are set."""
-        return {other: None for key, other in (("node", "position"), ("position", "node")) if key in keys}
-
 
 @dataclass(frozen=True, kw_only=True)
-class Masses:
+class Masses(Part):
     """A mass in both lateral directions, or one for each."""
+
+    BOTH: ClassVar = {"mass": (("myy", "mzz"), ())}
 
     mass: float | None = quantity(
         "kg",
@@ -44,75 +86,51 @@ class Masses:
         default=None,
         at_least=0,
     )
-    myy: float | None = quantity(
-        "kg", doc="Mass in vertical motion.", example='"2 kg"', default=None, at_least=0
-    )
-    mzz: float | None = quantity(
-        "kg", doc="Mass in horizontal motion.", example='"2 kg"', default=None, at_least=0
-    )
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-        check_pairs(self, "mass", ("myy", "mzz"))
+    myy: float | None = quantity("kg", doc="Mass in vertical motion.", default=None, at_least=0)
+    mzz: float | None = quantity("kg", doc="Mass in horizontal motion.", default=None, at_least=0)
 
     @property
     def mass_matrix(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """((myy, 0), (0, mzz)), kg."""
-        myy, mzz = (v if v is not None else self.mass or 0.0 for v in (self.myy, self.mzz))
+        myy, mzz = self.straight("mass")
         return (myy, 0.0), (0.0, mzz)
 
-    def displaced(self, keys: set[str]) -> dict[str, Any]:
-        """Return the changes of other fields when `keys` are set."""
-        return _displaced_pairs(self, keys, "mass", ("myy", "mzz"))
+
+COEFFICIENTS = {
+    "stiffness": (("kyy", "kzz"), ("kyz", "kzy")),
+    "damping": (("cyy", "czz"), ("cyz", "czy")),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Springs(Masses):
     """A linear support: `stiffness` and `damping` in both directions, or full 2x2 matrices."""
 
+    BOTH = Masses.BOTH | COEFFICIENTS
+
     stiffness: float | None = quantity(
         "N/m",
         doc="Stiffness in both lateral directions, in place of kyy, kzz, kyz and kzy.",
-        example='"1e6 N/m"',
         default=None,
         at_least=0,
     )
-    kyy: float | None = quantity(
-        "N/m", doc="Vertical stiffness.", example='"1e6 N/m"', default=None, at_least=0
-    )
-    kzz: float | None = quantity(
-        "N/m", doc="Horizontal stiffness.", example='"1e6 N/m"', default=None, at_least=0
-    )
-    kyz: float = quantity(
-        "N/m", doc="Vertical force per horizontal displacement.", example='"2e5 N/m"', default=0.0
-    )
-    kzy: float = quantity(
-        "N/m", doc="Horizontal force per vertical displacement.", example='"-2e5 N/m"', default=0.0
-    )
+    kyy: float | None = quantity("N/m", doc="Vertical stiffness.", default=None, at_least=0)
+    kzz: float | None = quantity("N/m", doc="Horizontal stiffness.", default=None, at_least=0)
+    kyz: float = quantity("N/m", doc="Vertical force per horizontal displacement.", default=0.0)
+    kzy: float = quantity("N/m", doc="Horizontal force per vertical displacement.", default=0.0)
     damping: float | None = quantity(
         "N s/m",
         doc="Damping in both lateral directions, in place of cyy, czz, cyz and czy.",
-        example='"100 N s/m"',
         default=None,
         at_least=0,
     )
-    cyy: float | None = quantity(
-        "N s/m", doc="Vertical damping.", example='"100 N s/m"', default=None, at_least=0
-    )
-    czz: float | None = quantity(
-        "N s/m", doc="Horizontal damping.", example='"100 N s/m"', default=None, at_least=0
-    )
-    cyz: float = quantity(
-        "N s/m", doc="Vertical force per horizontal velocity.", example='"20 N s/m"', default=0.0
-    )
-    czy: float = quantity(
-        "N s/m", doc="Horizontal force per vertical velocity.", example='"20 N s/m"', default=0.0
-    )
+    cyy: float | None = quantity("N s/m", doc="Vertical damping.", default=None, at_least=0)
+    czz: float | None = quantity("N s/m", doc="Horizontal damping.", default=None, at_least=0)
+    cyz: float = quantity("N s/m", doc="Vertical force per horizontal velocity.", default=0.0)
+    czy: float = quantity("N s/m", doc="Horizontal force per vertical velocity.", default=0.0)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for one, letter in (("stiffness", "k"), ("damping", "c")):
-            check_pairs(self, one, (f"{letter}yy", f"{letter}zz", f"{letter}yz", f"{letter}zy"))
         if self.stiffness is None and (self.kyy is None or self.kzz is None):
             key = "kyy" if self.kyy is None else "kzz"
             raise FieldError(key, "missing; give either stiffness, or kyy and kzz")
@@ -120,22 +138,14 @@ class Springs(Masses):
     @property
     def stiffness_matrix(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """((kyy, kyz), (kzy, kzz)), N/m."""
-        kyy, kzz = (v if v is not None else self.stiffness or 0.0 for v in (self.kyy, self.kzz))
+        kyy, kzz = self.straight("stiffness")
         return (kyy, self.kyz), (self.kzy, kzz)
 
     @property
     def damping_matrix(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """((cyy, cyz), (czy, czz)), N s/m."""
-        cyy, czz = (v if v is not None else self.damping or 0.0 for v in (self.cyy, self.czz))
+        cyy, czz = self.straight("damping")
         return (cyy, self.cyz), (self.czy, czz)
-
-    def displaced(self, keys: set[str]) -> dict[str, Any]:
-        """Return the changes of other fields when `keys` are set."""
-        changes = super().displaced(keys)
-        for one, letter in (("stiffness", "k"), ("damping", "c")):
-            straight, crossed = (f"{letter}yy", f"{letter}zz"), (f"{letter}yz", f"{letter}zy")
-            changes |= _displaced_pairs(self, keys, one, straight, crossed)
-        return changes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -180,34 +190,7 @@ class Support(Masses, Placed):
         or_unit="s",
     )
 
-    def __post_init__(self) -> None:
-        Placed.__post_init__(self)
-        Masses.__post_init__(self)
-
-    def displaced(self, keys: set[str]) -> dict[str, Any]:
-        """Return the changes of other fields when `keys` are set."""
-        return Placed.displaced(self, keys) | Masses.displaced(self, keys)
-
 
 def is_time(until: float) -> bool:
     """Whether a value of `until` is a time, s, not a number of revolutions."""
     return getattr(until, "unit", "") == "s"
-
-
-def check_pairs(owner: Masses, one: str, pairs: tuple[str, ...]) -> None:
-    """Refuse a value for both directions together with those of single ones."""
-    for key in pairs:
-        if getattr(owner, one) is not None and getattr(owner, key) not in (None, 0.0):
-            raise FieldError(key, f"conflicts with {one}; give either {one} or {', '.join(pairs)}")
-
-
-def _displaced_pairs(
-    owner: Masses, keys: set[str], one: str, straight: tuple[str, ...], crossed: tuple[str, ...] = ()
-) -> dict[str, Any]:
-    """Return the changes when the value for both directions, or that of a single one, is set."""
-    common = getattr(owner, one)
-    if one in keys and not keys & {*straight, *crossed}:
-        return dict.fromkeys(straight) | dict.fromkeys(crossed, 0.0)
-    if common is not None and keys & {*straight, *crossed}:
-        return dict.fromkeys(straight, common) | {one: None}
-    return {}

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rubhpc.models import may_reverse
 from rubhpc.schema import DIVERGED, DONE, FAILED, INFERRED, MISSING, REGIME, SETTLED, STATUS
 from rubhpc.storage.duration import duration
-from rubhpc.study.contact_axes import PREFIX, choices_of
+from rubhpc.study.axes import meanings_of
 from rubhpc.validity import MONITORS, STEADY_SLIP, counted
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
     from rubhpc.storage.manifest import Manifest
 
-_LAW = f"{PREFIX}friction_law"
+_LAW = "contact.friction_law"
 
 
 def verdicts(manifest: Manifest, is_done: NDArray[np.bool_], measures: NDArray[np.void]) -> str:
@@ -59,17 +60,17 @@ def verdicts(manifest: Manifest, is_done: NDArray[np.bool_], measures: NDArray[n
 
 
 def _may_reverse(manifest: Manifest) -> NDArray[np.bool_]:
-    """Whether slip may reverse in a case, (n_case,): under Coulomb's law."""
+    """Whether slip may reverse in a case, (n_case,): under every law but steady sliding."""
     for axis in manifest.axes:
         if axis.name == _LAW:
-            is_coulomb = np.array(axis.values) == choices_of(_LAW).index("coulomb")
+            reverses = np.array([may_reverse(law) for law in meanings_of(_LAW)])[np.array(axis.values, int)]
             lengths = [
                 n if dim == axis.dimension else 1
                 for dim, n in zip(manifest.dims, manifest.shape, strict=True)
             ]
-            return np.broadcast_to(is_coulomb.reshape(lengths), manifest.shape).ravel()
+            return np.broadcast_to(reverses.reshape(lengths), manifest.shape).ravel()
     law = manifest.parts.get("contact", {}).get("friction_law")
-    return np.full(manifest.n_case, law == "coulomb")
+    return np.full(manifest.n_case, may_reverse(law))
 
 
 _LOST = 71

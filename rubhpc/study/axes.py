@@ -12,11 +12,14 @@ import numpy as np
 from rubhpc.errors import InputError
 from rubhpc.input.fields import check_value, quantity
 from rubhpc.input.messages import brief, nearest, place
-from rubhpc.study import contact_axes, initial
-from rubhpc.study.contact_axes import choices_of, contact_field
+from rubhpc.study.contact_keys import Contact
+from rubhpc.study.initial import Initial
 from rubhpc.units import typed_quantity
 
 if TYPE_CHECKING:
+    from dataclasses import Field
+    from typing import Any
+
     from numpy.typing import NDArray
 
     from rubhpc.input.quantity import Range
@@ -66,14 +69,24 @@ class DriveAxes:
     )
 
 
-RUN_UP_PREFIX, RUN_UP_TIME = "run_up.", "run_up.time"
-DRIVE_PREFIX = "drive."
-DRIVE_AXES = tuple(DRIVE_PREFIX + declared.name for declared in fields(DriveAxes))
-OWN = {declared.name: declared for declared in fields(OwnAxes)} | {
-    prefix + declared.name: declared
-    for prefix, owner in ((RUN_UP_PREFIX, RunUpAxes), (DRIVE_PREFIX, DriveAxes))
-    for declared in fields(owner)
+RUN_UP_TIME, KNOCKED = "run_up.time", "initial.impulse_node"
+_NO_AXES = ("model", "from_", "select")
+# Keys of tables that may be axes, as "contact.law": by the table, and by the name of the axis.
+TABLES: dict[str, dict[str, Field[Any]]] = {
+    table: {
+        f"{table}.{declared.name}": declared
+        for declared in fields(owner)
+        if declared.metadata.get("kind") not in (None, "series") and declared.name not in _NO_AXES
+    }
+    for table, owner in (
+        ("contact", Contact),
+        ("initial", Initial),
+        ("run_up", RunUpAxes),
+        ("drive", DriveAxes),
+    )
 }
+OF_TABLES = {name: declared for keys in TABLES.values() for name, declared in keys.items()}
+OWN = {declared.name: declared for declared in fields(OwnAxes)} | TABLES["run_up"] | TABLES["drive"]
 SPEED_AXES = ("speed_ratio", "speed")
 CLEARANCE_AXES = ("clearance_ratio", "clearance")
 SWEEPS = ("from_rest", "up", "down", "both")
@@ -135,23 +148,22 @@ class Axis:
     @property
     def is_rig_key(self) -> bool:
         """Whether the axis sets a key of the rig."""
-        return self.name not in OWN and self.name != DIRECTION and not is_of_table(self.name)
+        return self.name not in OWN and self.name != DIRECTION and not self.table
 
     @property
-    def is_contact_key(self) -> bool:
-        """Whether the axis sets a key of [contact]."""
-        return self.name.startswith(contact_axes.PREFIX)
+    def table(self) -> str:
+        """Table whose key the axis sets: contact, initial, run_up or drive; or ""."""
+        return axis_table(self.name)
 
     @property
-    def is_initial_key(self) -> bool:
-        """Whether the axis sets a key of [initial]."""
-        return self.name.startswith(initial.PREFIX)
+    def key(self) -> str:
+        """Name of that key."""
+        return self.name.removeprefix(f"{self.table}.")
 
     @property
     def words(self) -> list[str]:
         """What its values stand for; [] where they are quantities."""
-        meanings = meanings_of(self.name)
-        return [meanings[int(value)] for value in self.values] if meanings else []
+        return [str(stated(self.name, value)) for value in self.values] if meanings_of(self.name) else []
 
     @property
     def tried(self) -> tuple[float, ...]:
@@ -166,9 +178,10 @@ def direction_axis() -> Axis:
     )
 
 
-def is_of_table(name: str) -> bool:
-    """Whether an axis sets a key of [contact], [initial], [run_up] or [drive]."""
-    return name.startswith((contact_axes.PREFIX, initial.PREFIX, RUN_UP_PREFIX, DRIVE_PREFIX))
+def axis_table(name: str) -> str:
+    """Return the table whose key an axis sets: contact, initial, run_up or drive; or ""."""
+    table, dot, _ = name.partition(".")
+    return table if dot and table in TABLES else ""
 
 
 def coordinate_of(name: str) -> str:
@@ -178,21 +191,30 @@ def coordinate_of(name: str) -> str:
 
 def meanings_of(name: str) -> tuple[str, ...]:
     """Return what the values 0, 1, ... on an axis stand for; () where they are quantities."""
-    return DIRECTIONS if name == DIRECTION else choices_of(name)
+    if name == DIRECTION:
+        return DIRECTIONS
+    found: tuple[str, ...] = OF_TABLES[name].metadata.get("of", ()) if name in OF_TABLES else ()
+    return found
+
+
+def stated(name: str, value: float) -> float | str:
+    """Return what a value on an axis stands for, as its key takes it: a word, a whole number, or itself."""
+    if meanings := meanings_of(name):
+        return meanings[int(value)]
+    is_count = name in OF_TABLES and OF_TABLES[name].metadata["kind"] == "count"
+    return int(value) if is_count else value
 
 
 def written(name: str, value: float, unit: str) -> str:
     """Return a value on an axis for people, as in `friction=0.3` or `speed=1200 rpm`."""
-    if meanings := meanings_of(name):
-        return f"{name}={meanings[int(value)]}"
-    return f"{name}={typed_quantity(value, unit)}"
+    return f"{name}={stated(name, value) if meanings_of(name) else typed_quantity(value, unit)}"
 
 
 def why_not_swept(name: str) -> str:
     """Return why no sweep runs along an axis; "" where one may."""
-    if choices_of(name):
+    if meanings_of(name):
         return "words have no order to sweep along; leave it out, or sweep another axis"
-    if name.startswith(initial.PREFIX):
+    if axis_table(name) == "initial":
         return "in a sweep a case starts where another has ended; sweep another axis"
     return ""
 
@@ -206,8 +228,8 @@ def problem_of(name: str, values: tuple[float, ...], *, is_drawn: bool = False) 
     """Return what is wrong with the values of an axis; "" when nothing is."""
     if not values:
         return "empty; give at least one value"
-    if name in OWN or (name.startswith(contact_axes.PREFIX) and not choices_of(name)):
-        declared = OWN[name] if name in OWN else contact_field(name)
+    declared = OWN.get(name) or TABLES["contact"].get(name)
+    if declared is not None and not meanings_of(name):
         for value in (min(values), max(values)):
             if problem := check_value(declared, value):
                 return problem
@@ -216,8 +238,8 @@ def problem_of(name: str, values: tuple[float, ...], *, is_drawn: bool = False) 
     if not is_drawn and len(set(values)) < len(values):
         ordered = sorted(values)
         twice = next(v for v, following in itertools.pairwise(ordered) if v == following)
-        meanings = meanings_of(name)
-        return f"{meanings[int(twice)] if meanings else f'{twice:.12g}'} is duplicated; remove one"
+        shown = stated(name, twice) if meanings_of(name) else f"{twice:.12g}"
+        return f"{shown} is duplicated; remove one"
     return ""
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rubhpc.study.axes import CLEARANCE_AXES, SPEED_AXES, meanings_of
+from rubhpc.study.axes import CLEARANCE_AXES, SPEED_AXES
 from rubhpc.units import typed_quantity
 
 if TYPE_CHECKING:
@@ -32,8 +32,8 @@ def axis_ranges(grid: CaseGrid) -> tuple[str, ...]:
 
 
 def _values(axis: Axis) -> str:
-    if words := meanings_of(axis.name):
-        return ", ".join(words[int(value)] for value in axis.values)
+    if words := axis.words:
+        return ", ".join(words)
     return _range(min(axis.values), max(axis.values), axis.unit)
 
 

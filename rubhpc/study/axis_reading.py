@@ -6,29 +6,26 @@ import re
 from dataclasses import Field, replace
 from typing import TYPE_CHECKING, Any
 
-from rubhpc.errors import InputError, located
+from rubhpc.errors import InputError
 from rubhpc.input.fields import check_value, parse_field
 from rubhpc.input.messages import brief, nearest, place
 from rubhpc.input.quantity import MOST_VALUES, RANGE_KEYS, read_ends, read_range
 from rubhpc.input.reading import find_key
-from rubhpc.study import contact_axes
 from rubhpc.study.axes import (
-    DRIVE_PREFIX,
     FROM_REST,
     NO_NEIGHBOURS,
+    OF_TABLES,
     OWN,
-    RUN_UP_PREFIX,
     SPEED_AXES,
     SWEEPS,
+    TABLES,
     Axis,
+    axis_table,
     coordinate_of,
-    is_of_table,
     problem_of,
     unknown_sweep,
     why_not_swept,
 )
-from rubhpc.study.contact_axes import contact_field
-from rubhpc.study.initial import initial_field
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -55,11 +52,6 @@ def make_axis(name: str, values: object, rig: Rig, file: str = "") -> Axis:
         Whose keys the axis may name.
     file : str
         What errors name.
-
-    Raises
-    ------
-    InputError
-        When the name is unknown, or a value is invalid or duplicated.
     """
     where = place(file, "grid", name)
     declared = declared_axis(name, rig, where)
@@ -75,13 +67,7 @@ def make_axis(name: str, values: object, rig: Rig, file: str = "") -> Axis:
 
 
 def unit_of(name: str, rig: Rig) -> str:
-    """Return the unit of an axis as quantities are written: "kg/m^3"; "" without dimension.
-
-    Raises
-    ------
-    InputError
-        When the name is unknown, or its values are no quantities.
-    """
+    """Return the unit of an axis as quantities are written: "kg/m^3"; "" without dimension."""
     declared = declared_axis(name, rig, name)
     if declared.metadata["kind"] != "quantity":
         raise InputError(f"{name}: is not a quantity; give one, such as friction")
@@ -92,11 +78,6 @@ def make_range(name: str, table: Mapping[str, object], rig: Rig, file: str = "")
     """Return an axis whose values are yet to be drawn, from `{start, stop}` and the `scale` "lin" or "log".
 
     Until then they are the two ends (`rubhpc.study.sampling.draw`).
-
-    Raises
-    ------
-    InputError
-        When the name is unknown, or nothing can be drawn from such a range.
     """
     where = place(file, "grid", name)
     if "sweep" in table:
@@ -144,14 +125,11 @@ def flatten(table: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]
 
 def declared_axis(name: str, rig: Rig, where: str) -> Field[Any]:
     """Return the declaration of what an axis sets; InputError where it sets nothing."""
-    if name in OWN:
-        return OWN[name]
-    if name.startswith((RUN_UP_PREFIX, DRIVE_PREFIX)):
-        known = [axis for axis in OWN if axis.startswith((RUN_UP_PREFIX, DRIVE_PREFIX))]
-        raise InputError(f"{where}: unknown axis; {nearest(name, known)}")
-    if is_of_table(name):
-        with located(f"{where}: "):
-            return contact_field(name) if name.startswith(contact_axes.PREFIX) else initial_field(name)
+    known = OWN | OF_TABLES
+    if name in known:
+        return known[name]
+    if table := axis_table(name):
+        raise InputError(f"{where}: unknown axis; {nearest(name, TABLES[table])}")
     try:
         declared = find_key(rig, name)
     except InputError as error:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from rubhpc.errors import InputError
 from rubhpc.input.fields import FieldError, check_fields, count, quantity, series, text
 from rubhpc.input.messages import place
-from rubhpc.study.axes import FROM_REST, Axis, is_of_table
+from rubhpc.study.axes import FROM_REST, Axis, axis_table
 from rubhpc.study.axis_reading import make_range
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def branch_axis(name: str, values: object, rig: Rig, file: str) -> Axis:
 
 def check_followed(along: str, where: str) -> None:
     """Refuse an axis along which branches do not run."""
-    if is_of_table(along):
+    if axis_table(along):
         raise InputError(
             f"{where}: {along} cannot be followed; use a speed, a clearance, friction or a key of the rig"
         )

@@ -23,10 +23,9 @@ from rubhpc.input.messages import place
 from rubhpc.rig.reading import with_keys
 from rubhpc.rig.stators import gap_problem
 from rubhpc.schema import STATE
-from rubhpc.study.axes import FROM_REST, RUN_UP_TIME
+from rubhpc.study.axes import FROM_REST, KNOCKED, RUN_UP_TIME
 from rubhpc.study.continuation import CaseIds, continuation_of
 from rubhpc.study.identity import identity_parts
-from rubhpc.study.initial import KNOCKED
 from rubhpc.study.operating_points import operating_points_of
 from rubhpc.study.points import MOST_CASES, Points, boxed
 from rubhpc.study.warnings import decay_of, warnings_of
@@ -109,13 +108,7 @@ _MOST_RIGS = 64  # along an axis: assembled before the run, 1 ms each; of more v
 
 
 def count_state(study: Study) -> int:
-    """Length of the final state of a case: displacement and velocity of each degree, two per stator.
-
-    Raises
-    ------
-    InputError
-        When it differs between cases: the final state of one cannot start another.
-    """
+    """Length of the final state of a case: displacement and velocity of each degree, two per stator."""
     models = _models(study)
     n_state = state_size(next(models)[1])
     for name, model in models:
@@ -132,13 +125,7 @@ def count_state(study: Study) -> int:
 
 
 def check_start(study: Study) -> None:
-    """Refuse a state of a store that does not fit the rigs of a study.
-
-    Raises
-    ------
-    InputError
-        Names the degrees of freedom of both.
-    """
+    """Refuse a state of a store that does not fit the rigs of a study."""
     if study.initial.state is not None:
         for _, model in _models(study):
             study.initial.state.check_fit(model)

@@ -7,28 +7,35 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypedDict
 
 from rubhpc.input.fields import FieldError, check_fields, choice, quantity, series
-from rubhpc.models import MODELS, chosen, default_of
-from rubhpc.rig.normal_law import LAWS, damping_key, restitution_key, stiffness_key, take_units
+from rubhpc.models import FRICTION_LAWS, MODELS, NORMAL_LAWS, chosen, default_of
+from rubhpc.rig.normal_law import (
+    NEEDS_LAW,
+    check_keys,
+    check_spring,
+    damping_key,
+    restitution_key,
+    stiffness_key,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-FRICTION_LAWS = "sliding", "coulomb", "stribeck", "table"
-# Keys of [contact] that belong to some laws only, and what their absence means there: None needs them.
-NEEDS_LAW: dict[str, tuple[str, tuple[str, ...], str]] = {
-    "stiffness": ("law", ("penalty", "hertz"), "a multiplier has none"),
-    "damping": ("law", ("penalty", "hertz"), "a multiplier has none"),
-    "restitution": ("law", ("lagrange",), "a penalty's rebound comes from its spring and damper"),
-    "static_friction_ratio": ("friction_law", ("coulomb", "stribeck"), "this law has no such ratio"),
-    "stribeck_speed": ("friction_law", ("stribeck",), "other laws have no such speed"),
-    "slip_speed": ("friction_law", ("table",), "other laws have no table"),
-    "friction_ratio": ("friction_law", ("table",), "other laws have no table"),
+# Keys that belong to some friction laws only, as those of the normal force (`rubhpc.rig.normal_law`).
+_NEEDS_FRICTION_LAW = {
+    "static_friction_ratio": (("coulomb", "stribeck"), "this law has no such ratio"),
+    "stribeck_speed": (("stribeck",), "other laws have no such speed"),
+    "slip_speed": (("table",), "other laws have no table"),
+    "friction_ratio": (("table",), "other laws have no table"),
 }
-_EXAMPLES = {
-    ("law", "penalty"): {"stiffness": "1e8"},
-    ("law", "hertz"): {"stiffness": '"1e10 N/m^1.5"'},
-    ("friction_law", "stribeck"): {"static_friction_ratio": "1.3", "stribeck_speed": '"0.1 m/s"'},
-    ("friction_law", "table"): {"slip_speed": "[0, 0.1, 1.0]", "friction_ratio": "[1.3, 1.1, 1.0]"},
+_NEEDED = {
+    "stribeck": {"static_friction_ratio": "1.3", "stribeck_speed": '"0.1 m/s"'},
+    "table": {"slip_speed": "[0, 0.1, 1.0]", "friction_ratio": "[1.3, 1.1, 1.0]"},
+}
+# Of each key that belongs to some laws only: the key of these laws, and the laws.
+LAWS_OF: dict[str, tuple[str, tuple[str, ...]]] = {
+    key: (kind, laws)
+    for kind, needs in (("law", NEEDS_LAW), ("friction_law", _NEEDS_FRICTION_LAW))
+    for key, (laws, _) in needs.items()
 }
 
 
@@ -40,7 +47,7 @@ class ContactKeys:
         doc="Contact law: multipliers that close gaps exactly, a spring and damper (penalty), or Hertz's law "
         "with Hunt and Crossley's damping.",
         example='"penalty"',
-        of=LAWS,
+        of=NORMAL_LAWS,
         default="lagrange",
     )
     stiffness: float | None = stiffness_key()
@@ -135,16 +142,8 @@ class Contact(ContactKeys):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for key, (kind, laws, reason) in NEEDS_LAW.items():
-            if getattr(self, key) is not None and getattr(self, kind) not in laws:
-                raise FieldError(key, f'{reason}; set {kind} = "{laws[0]}", or leave it out')
-        for (kind, law), needed in _EXAMPLES.items():
-            for key, example in needed.items():
-                if getattr(self, kind) == law and getattr(self, key) is None:
-                    raise FieldError(key, f'missing; {kind} = "{law}" needs one, such as {key} = {example}')
-        take_units(self, self.law, "law")
-        if self.restitution is not None and self.restitution > 1:
-            raise FieldError("restitution", f"{self.restitution:g} is out of range; it must be at most 1")
+        check_spring(self, "law")
+        check_keys(self, "friction_law", _NEEDS_FRICTION_LAW, _NEEDED)
         if self.slip_speed is not None and self.friction_ratio is not None:
             _check_table(self.slip_speed, self.friction_ratio)
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import struct
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,19 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-
-class Named(Protocol):
-    """What a continuation needs of an axis."""
-
-    @property
-    def name(self) -> str:
-        """Key in the study."""
-        ...
-
-    @property
-    def sweep(self) -> str:
-        """One of `axes.SWEEPS`."""
-        ...
+    from rubhpc.study.points import AnyAxis
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,9 +42,9 @@ class Continuation:
     direction: int | None = None
     is_down: bool = False
 
-    def is_downward(self, index: Sequence[int]) -> bool:
-        """Whether the sweep of this case runs from high to low values."""
-        return self.is_down if self.direction is None else index[self.direction] == 1
+    def is_downward(self, at: Sequence[float]) -> bool:
+        """Whether the sweep of a case, by its index or its values, runs from high to low values."""
+        return self.is_down if self.direction is None else at[self.direction] == 1
 
     def position(self, index: Sequence[int]) -> int:
         """Sort key of a case in its sweep: the lowest is computed first."""
@@ -85,7 +73,7 @@ class Continuation:
         return np.stack(both if self.direction is not None else [both[self.is_down]], axis=1)
 
 
-def continuation_of(axes: Sequence[Named]) -> Continuation | None:
+def continuation_of(axes: Sequence[AnyAxis]) -> Continuation | None:
     """The continuation of a grid; None where every case starts at rest."""
     swept = next((i for i, axis in enumerate(axes) if axis.sweep != FROM_REST), None)
     if swept is None:
@@ -119,11 +107,7 @@ class CaseIds:
         digest = self._identity.copy()
         digest.update(struct.pack(f"<{len(point)}d", *point))
         if (continuation := self._continuation) is not None:
-            is_down = (
-                continuation.is_down
-                if continuation.direction is None
-                else point[continuation.direction] == 1.0
-            )
+            is_down = continuation.is_downward(point)
             digest.update(self._lineage[point[continuation.axis], is_down])
         return digest.hexdigest()[:32]
 

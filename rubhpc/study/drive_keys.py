@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 from rubhpc.errors import InputError, located
 from rubhpc.input.fields import FieldError, check_fields, count, quantity, series
-from rubhpc.study.axes import DRIVE_AXES, DRIVE_PREFIX
 from rubhpc.study.drive_law import DriveLaw
 from rubhpc.study.run_up_keys import check_changing
 from rubhpc.study.speed_law import MOST_REVOLUTIONS
@@ -47,7 +46,6 @@ class DriveKeys:
     inertia: float | None = quantity(
         "kg*m^2",
         doc="Polar inertia of drive and coupling; by default a thousandth of the rotor's.",
-        example='"0.01 kg m^2"',
         default=None,
         above=0,
     )
@@ -81,18 +79,12 @@ class DriveKeys:
             self._check_range(self.start)
 
     def law_at(self, given: Mapping[str, float]) -> DriveLaw:
-        """The drive of a case, `given` being its values on the axes drive.torque, drive.start, drive.inertia.
-
-        Raises
-        ------
-        InputError
-            No drive follows from it.
-        """
+        """The drive of a case with these values on the axes drive.torque, drive.start, drive.inertia."""
         torque = (given["torque"],) if "torque" in given else self.torque
         start = given.get("start", self.start)
         for name, value in (("torque", torque), ("start", start)):
             if value is None:
-                raise FieldError(name, f"missing; give one, or the axis {DRIVE_PREFIX}{name}")
+                raise FieldError(name, f"missing; give one, or the axis drive.{name}")
         assert torque is not None
         assert start is not None
         self._check_range(start)
@@ -119,38 +111,30 @@ class DriveKeys:
 
 def first_speed(keys: DriveKeys, axes: Sequence[Axis]) -> float:
     """The speed at which cases begin, rad/s; of several the highest."""
-    starts = [value for axis in axes if axis.name == f"{DRIVE_PREFIX}start" for value in axis.values]
+    starts = [value for axis in axes if axis.name == "drive.start" for value in axis.values]
     if not starts and keys.start is None:
-        raise InputError(f"[drive] start: missing; give one, or the axis {DRIVE_PREFIX}start")
+        raise InputError("[drive] start: missing; give one, or the axis drive.start")
     return max(starts) if starts else keys.start or 0.0
 
 
 def check_drive(
     keys: DriveKeys | None, axes: Sequence[Axis], integrator: Integrator, recording: Recording, others: str
 ) -> None:
-    """Refuse what a drive cannot turn; `others` names a table that leaves no room for it, or is "".
-
-    Raises
-    ------
-    InputError
-        It names the key.
-    """
-    varied = {axis.name: axis for axis in axes if axis.name in DRIVE_AXES}
+    """Refuse what a drive cannot turn; `others` names a table that leaves no room for it, or is ""."""
+    varied = {axis.key: axis for axis in axes if axis.table == "drive"}
     if keys is None:
-        for name in varied:
-            raise InputError(f"[grid] {name}: nothing drives the rotor; add the table [drive]")
+        for key in varied:
+            raise InputError(f"[grid] drive.{key}: nothing drives the rotor; add the table [drive]")
         return
     check_changing("drive", axes, integrator, recording, others)
-    for name, axis in varied.items():
-        key = name.removeprefix(DRIVE_PREFIX)
+    for key, axis in varied.items():
         if getattr(keys, key) is not None:
             raise InputError(f"[drive] {key}: is also an axis of the grid; remove one")
         if key == "torque" and keys.speed is not None:
             raise InputError("[drive] speed: goes with a table of torques, not with an axis; leave it out")
         if key == "start":
             for start in axis.tried:
-                with located(f"[grid] {name}: {start:g} rad/s: [drive] "):
+                with located(f"[grid] drive.start: {start:g} rad/s: [drive] "):
                     keys.law_at({"start": start} | ({"torque": 0.0} if keys.torque is None else {}))
-    given = {name.removeprefix(DRIVE_PREFIX): axis.tried[0] for name, axis in varied.items()}
     with located("[drive] "):
-        keys.law_at(given)
+        keys.law_at({key: axis.tried[0] for key, axis in varied.items()})

@@ -7,19 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 from rubhpc.input.reading import plain
 from rubhpc.rig.reading import with_keys
-from rubhpc.study import contact_axes, initial
-from rubhpc.study.axes import (
-    DRIVE_AXES,
-    DRIVE_PREFIX,
-    FROM_REST,
-    RUN_UP_PREFIX,
-    RUN_UP_TIME,
-)
+from rubhpc.study.axes import FROM_REST, TABLES
+from rubhpc.study.initial import Initial
 
 if TYPE_CHECKING:
     from rubhpc.study.study import Study
 
-PHYSICS = 200  # version of the physics: raised whenever a study gives other results than before
+PHYSICS = 201  # version of the physics: raised whenever a study gives other results than before
 WHOLE = "n (this sample is drawn as a whole and cannot grow)"
 # Keys of [contact] that are stated even where they are not given, as older stores do.
 _ALWAYS = ("stiffness", "damping", "restitution", "static_friction_ratio")
@@ -41,35 +35,30 @@ def identity_parts(study: Study) -> dict[str, Any]:
     del rig["name"]
     contact = {k: v for k, v in asdict(study.contact).items() if v is not None or k in _ALWAYS}
     contact.pop("model", None)  # its keys are there
-    contact |= {
-        axis.name.removeprefix(contact_axes.PREFIX): _AXIS for axis in study.axes if axis.is_contact_key
-    }
+    varied = {table: {axis.key: _AXIS for axis in study.axes if axis.table == table} for table in TABLES}
     swept = {axis.name: axis.sweep for axis in study.axes if axis.sweep != FROM_REST}
     parts = {
         "physics": PHYSICS,
         "axes": [axis.name for axis in study.axes],
         **({"sweep": swept} if swept else {}),  # absent in older stores
         "rig": rig,
-        "contact": contact,
+        "contact": contact | varied["contact"],
         "integrator": asdict(study.integrator),
         "record": study.recording.as_dict() | {"keep": sorted(study.recording.keep)},
     }
-    starts = {axis.name.removeprefix(initial.PREFIX): _AXIS for axis in study.axes if axis.is_initial_key}
-    if starts or study.initial != initial.Initial():  # absent in older stores
+    if varied["initial"] or study.initial != Initial():  # absent in older stores
         stated = plain(study.initial)
         if study.initial.state is not None:  # wherever it has been read
             stated = {k: v for k, v in stated.items() if k not in ("from", "select")}
             stated["state"] = study.initial.state.digest
-        parts["initial"] = stated | starts
+        parts["initial"] = stated | varied["initial"]
     if study.branch is not None:
         span = study.axis(study.branch.along).drawn_from
         parts["branch"] = asdict(study.branch) | (asdict(span) if span else {})
     if study.run_up is not None:
-        varied = [axis.name for axis in study.axes if axis.name == RUN_UP_TIME]
-        parts["run_up"] = asdict(study.run_up) | {n.removeprefix(RUN_UP_PREFIX): _AXIS for n in varied}
+        parts["run_up"] = asdict(study.run_up) | varied["run_up"]
     if study.drive is not None:
-        varied = [axis.name for axis in study.axes if axis.name in DRIVE_AXES]
-        parts["drive"] = asdict(study.drive) | {n.removeprefix(DRIVE_PREFIX): _AXIS for n in varied}
+        parts["drive"] = asdict(study.drive) | varied["drive"]
     if study.sample is not None:
         ranges = {axis.name: asdict(axis.drawn_from) for axis in study.axes if axis.drawn_from}
         parts["sample"] = {

@@ -1,25 +1,13 @@
-"""Where cases start: the table [initial], and its keys as axes of a grid."""
+"""Where cases start: the table [initial]."""
 
 from __future__ import annotations
 
-import itertools
-from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
 
-from rubhpc.errors import InputError, located
 from rubhpc.input.fields import FieldError, check_fields, count, quantity, selection, text
-from rubhpc.input.messages import nearest
 from rubhpc.study.stored_state import StoredState  # noqa: TC001 - annotations are read when a table is built
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from dataclasses import Field
-
-    from rubhpc.study.contact_axes import Tried
-
-PREFIX = "initial."
 REST, CONTACT_FREE = "rest", "contact_free"
-KNOCKED = PREFIX + "impulse_node"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,10 +43,7 @@ class Initial:
     )
     impulse: float = quantity("N*s", doc="Impulse of a knock on the rotor.", example='"0.2 N*s"', default=0.0)
     impulse_angle: float = quantity(
-        "rad",
-        doc="Direction of the impulse, from straight up in the sense of positive spin.",
-        example='"90 deg"',
-        default=0.0,
+        "rad", doc="Direction of the impulse, from straight up in the sense of positive spin.", default=0.0
     )
     impulse_node: int | None = count(
         doc="Node of the rotor that the impulse acts on; by default the output node.",
@@ -84,58 +69,3 @@ class Initial:
 
 
 DISTURBANCES = ("vertical", "horizontal", "vertical_velocity", "horizontal_velocity", "impulse")
-_NO_AXES = ("from_", "select", "state")
-_AXES = {PREFIX + declared.name: declared for declared in fields(Initial) if declared.name not in _NO_AXES}
-
-
-def initial_field(name: str) -> Field[Any]:
-    """Return the declaration of a key such as "initial.vertical".
-
-    Raises
-    ------
-    InputError
-        There is no such axis.
-    """
-    if name not in _AXES:
-        raise InputError(f"unknown axis; {nearest(name, _AXES)}")
-    return _AXES[name]
-
-
-def initial_at(stated: Initial, values: Mapping[str, float]) -> Initial:
-    """Return where the cases start that have these values on the initial axes.
-
-    Parameters
-    ----------
-    stated : Initial
-        What [initial] gives for all cases.
-    values : mapping of axis name to value
-    """
-    if not values:
-        return stated
-    set_here: dict[str, Any] = {
-        name.removeprefix(PREFIX): int(value) if initial_field(name).metadata["kind"] == "count" else value
-        for name, value in values.items()
-    }
-    return replace(stated, **set_here)
-
-
-def check_initials(stated: Initial, axes: Sequence[Tried]) -> None:
-    """Refuse values on initial axes that cannot be, and keys of [initial] that change nothing.
-
-    Raises
-    ------
-    InputError
-        Names the values on the axes, or the key.
-    """
-    names = {axis.name.removeprefix(PREFIX) for axis in axes}
-    if stated.impulse == 0.0 and "impulse" not in names:
-        for key in ("impulse_angle", "impulse_node"):
-            if key in names or getattr(stated, key):
-                where = f"[grid] {PREFIX}{key}" if key in names else f"[initial] {key}"
-                raise InputError(f'{where}: there is no impulse; give one, such as impulse = "0.1 N*s"')
-    ends = [(min(axis.tried), max(axis.tried)) for axis in axes]
-    for values in itertools.product(*ends):
-        at = {axis.name: value for axis, value in zip(axes, values, strict=True)}
-        where = ", ".join(f"{name} = {value:g}" for name, value in at.items())
-        with located(f"[grid] {where}: "):
-            initial_at(stated, at)

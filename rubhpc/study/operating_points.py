@@ -20,10 +20,10 @@ from rubhpc.fem.response import (
 from rubhpc.fem.stability import instability_message, is_passive
 from rubhpc.fem.statics import sag_at_stators
 from rubhpc.rig.reading import with_keys
-from rubhpc.study.axes import CLEARANCE_AXES, DRIVE_AXES, DRIVE_PREFIX, RUN_UP_TIME, SPEED_AXES
-from rubhpc.study.contact_axes import choices_of, contact_at
-from rubhpc.study.initial import CONTACT_FREE, initial_at
+from rubhpc.study.axes import CLEARANCE_AXES, SPEED_AXES, TABLES, meanings_of
+from rubhpc.study.initial import CONTACT_FREE
 from rubhpc.study.points import Points
+from rubhpc.study.table_axes import contact_at, initial_at
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -86,11 +86,10 @@ class OperatingPoints:
         )
         self._is_speed_ratio = names[self._speed_axis] == "speed_ratio"
         self.is_clearance_ratio = names[self._clearance_axis] == "clearance_ratio"
-        self._contact_axes = [i for i, axis in enumerate(study.axes) if axis.is_contact_key]
-        self._initial_axes = [i for i, axis in enumerate(study.axes) if axis.is_initial_key]
+        self._contact_axes, self._initial_axes, self._run_up_axes, self._drive_axes = (
+            [i for i, axis in enumerate(study.axes) if axis.table == table] for table in TABLES
+        )
         self.rig_axes = [i for i, axis in enumerate(study.axes) if axis.is_rig_key]
-        self._run_up_axes = [i for i, name in enumerate(names) if name == RUN_UP_TIME]
-        self._drive_axes = [i for i, name in enumerate(names) if name in DRIVE_AXES]
         rotor_axes = [i for i in self.rig_axes if names[i].startswith("rotor.")]
         # The contact-free response depends on the rotor, and on the stator's node, at which it is evaluated.
         node_axes = [
@@ -174,7 +173,7 @@ class OperatingPoints:
 
     def with_each_law(self, index: Index) -> list[Index]:
         """Index of a case and of those that differ from it in the words on contact axes only."""
-        laws = set(self.dims(*(i for i in self._contact_axes if choices_of(self.study.axes[i].name))))
+        laws = set(self.dims(*(i for i in self._contact_axes if meanings_of(self.study.axes[i].name))))
         options = (
             range(n) if dim in laws else index[dim : dim + 1] for dim, n in enumerate(self.points.shape)
         )
@@ -237,24 +236,23 @@ class OperatingPoints:
 
     def named(self, axes: Iterable[int], index: Index) -> str:
         """Values of a case on some axes, for messages."""
-        names = (self.study.axes[i].name for i in axes)
-        pairs = zip(names, self._on(axes, index), strict=True)
-        return ", ".join(f"{name} = {value:g}" for name, value in pairs)
+        values = self._by_name(axes, self._on(axes, index))
+        return ", ".join(f"{name} = {value:g}" for name, value in values.items())
+
+    def _by_name(self, axes: Iterable[int], values: Values) -> dict[str, float]:
+        return dict(zip((self.study.axes[i].name for i in axes), values, strict=True))
 
     def _make_rig(self, values: Values) -> Rig:
         """Rig with these values on the rig axes."""
-        keys = (self.study.axes[i].name for i in self.rig_axes)
-        return with_keys(self.study.rig, dict(zip(keys, values, strict=True)))
+        return with_keys(self.study.rig, self._by_name(self.rig_axes, values))
 
     def _make_contact(self, values: Values) -> Contact:
         """Contact with these values on the contact axes."""
-        names = (self.study.axes[i].name for i in self._contact_axes)
-        return contact_at(self.study.contact, dict(zip(names, values, strict=True)))
+        return contact_at(self.study.contact, self._by_name(self._contact_axes, values))
 
     def _make_initial(self, values: Values) -> Initial:
         """Start with these values on the initial axes."""
-        names = (self.study.axes[i].name for i in self._initial_axes)
-        return initial_at(self.study.initial, dict(zip(names, values, strict=True)))
+        return initial_at(self.study.initial, self._by_name(self._initial_axes, values))
 
     def _make_model(self, values: Values) -> Model:
         """Model with these values on the response axes, and the first ones on the other rig axes."""
@@ -264,7 +262,7 @@ class OperatingPoints:
     def _drive_law(self, values: Values) -> DriveLaw:
         """Drive with these values on the drive axes."""
         assert self.study.drive is not None
-        keys = (self.study.axes[i].name.removeprefix(DRIVE_PREFIX) for i in self._drive_axes)
+        keys = (self.study.axes[i].key for i in self._drive_axes)
         return self.study.drive.law_at(dict(zip(keys, values, strict=True)))
 
     def _make_fastest(self, response: Values, drive: Values) -> float:

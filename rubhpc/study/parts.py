@@ -37,13 +37,7 @@ class Part(NamedTuple):
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """The part that a text such as "3/64" names.
-
-        Raises
-        ------
-        InputError
-            It names none.
-        """
+        """The part that a text such as "3/64" names."""
         found = re.fullmatch(r"(\d{1,99})/(\d{1,99})", text.strip(), re.ASCII)
         if found is None:
             raise InputError(f'part "{text}": is not of the form K/N; give for example 3/64')
@@ -56,13 +50,7 @@ class Part(NamedTuple):
 
 
 def check_parts(part: Part, study: Study) -> None:
-    """Check that a study can be computed in parts.
-
-    Raises
-    ------
-    InputError
-        It cannot.
-    """
+    """Check that a study can be computed in parts."""
     if study.refine is not None:
         why = "the levels of a refined map need the results of all parts"
         raise InputError(f"part {part}: {why}; use --workers or mpirun, or remove [refine]")

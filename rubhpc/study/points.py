@@ -18,18 +18,24 @@ Index = tuple[int, ...]
 Values = tuple[float, ...]
 
 
-class HasValues(Protocol):
-    """An axis: values along a dimension."""
+class AnyAxis(Protocol):
+    """An axis of a study, or as a store keeps it."""
+
+    @property
+    def name(self) -> str:
+        """Key in the study."""
 
     @property
     def dimension(self) -> str:
-        """Name of the dimension."""
-        ...
+        """Name of the dimension that it runs along."""
 
     @property
     def values(self) -> Values:
         """As many as the dimension is long."""
-        ...
+
+    @property
+    def sweep(self) -> str:
+        """One of `axes.SWEEPS`."""
 
 
 class Points:
@@ -51,7 +57,7 @@ class Points:
         Of each axis, along its dimension.
     """
 
-    def __init__(self, axes: Sequence[HasValues]) -> None:
+    def __init__(self, axes: Sequence[AnyAxis]) -> None:
         self.dims = tuple(dict.fromkeys(axis.dimension for axis in axes))
         length = {axis.dimension: len(axis.values) for axis in axes}
         self.shape = tuple(length[dim] for dim in self.dims)

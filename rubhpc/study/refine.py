@@ -63,13 +63,7 @@ class Refine:
             raise FieldError("coarse", problem)
 
     def refined(self, axes: Sequence[Axis]) -> list[str]:
-        """Return the names of the axes of a grid that are refined.
-
-        Raises
-        ------
-        InputError
-            There is none, or one cannot be.
-        """
+        """Return the names of the axes of a grid that are refined."""
         if any(axis.drawn_from is not None for axis in axes):
             raise InputError(
                 "[refine]: the cases of a sample have no neighbours; remove [refine] or [sample]"

@@ -44,11 +44,6 @@ def balanced(
         Of rubbing cases.
     drawn : callable
         Gives the first so many points of the sequence, the values on the ranges; more continue fewer.
-
-    Raises
-    ------
-    InputError
-        The ranges hold too few cases of one kind, or an axis has several values that decide whether it rubs.
     """
     rubs = _decision(axes, rig)
     wanted = {True: int(n * share), False: n - int(n * share)}

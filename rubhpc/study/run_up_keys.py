@@ -34,13 +34,7 @@ def refuse_speeds(table: str, names: Sequence[str]) -> None:
 def check_changing(
     table: str, axes: Sequence[Axis], integrator: Integrator, recording: Recording, others: str
 ) -> None:
-    """Refuse what a changing speed has no meaning for; `others` names a table that leaves no room, or is "".
-
-    Raises
-    ------
-    InputError
-        It names the key.
-    """
+    """Refuse what has no meaning under a changing speed; `others` names a table that excludes it, or ""."""
     if others:
         raise InputError(f"[{table}]: run-ups are not combined with [{others}]; remove one of them")
     if integrator.method != "modal":
@@ -84,7 +78,7 @@ class RunUpKeys:
         above=0,
     )
     law: tuple[tuple[float, float], ...] = pairs(
-        ("s", "rad/s"),
+        units=("s", "rad/s"),
         doc="In place of start, stop and time: speeds at some times, linear between them.",
         example='[["0 s", "300 rpm"], ["10 s", "3000 rpm"]]',
     )
@@ -110,13 +104,7 @@ class RunUpKeys:
         return max(speed for _, speed in self.law) if self.law else max(self.start or 0.0, self.stop or 0.0)
 
     def law_at(self, time: float | None) -> SpeedLaw:
-        """The speed over the time of a case, `time` (s) being its value on the axis run_up.time.
-
-        Raises
-        ------
-        FieldError
-            No speed follows from it.
-        """
+        """The speed over the time of a case, `time` (s) being its value on the axis run_up.time."""
         if self.law:
             times, speeds = zip(*self.law, strict=True)
             return SpeedLaw(time=times, speed=speeds)
@@ -129,13 +117,7 @@ class RunUpKeys:
 def check_run_up(
     keys: RunUpKeys | None, axes: Sequence[Axis], integrator: Integrator, recording: Recording, others: str
 ) -> None:
-    """Refuse what cannot run up; `others` names a table that leaves no room for it, or is "".
-
-    Raises
-    ------
-    InputError
-        It names the key.
-    """
+    """Refuse what cannot run up; `others` names a table that leaves no room for it, or is ""."""
     names = [axis.name for axis in axes]
     if keys is None:
         if RUN_UP_TIME in names:

@@ -43,11 +43,6 @@ def draw(axes: Sequence[Axis], sample: Sample, rig: Rig) -> tuple[Axis, ...]:
         One at least from `make_range`, two for Saltelli's design.
     rig : Rig
         Of which `sample.rub_share` decides whether a case rubs.
-
-    Raises
-    ------
-    InputError
-        When there are fewer ranges, too many cases, or too few that rub.
     """
     ranges = [axis for axis in axes if axis.drawn_from is not None]
     if not ranges or (sample.is_saltelli and len(ranges) < 2):

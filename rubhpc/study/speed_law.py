@@ -105,13 +105,7 @@ class SpeedLaw:
 
 
 def piece_length(per_revolution: int, pieces_per_revolution: int) -> int:
-    """Return the samples of a piece where a revolution is cut into so many equal ones.
-
-    Raises
-    ------
-    InputError
-        It is not a divisor of the samples in a revolution.
-    """
+    """Return the samples of a piece where a revolution is cut into so many equal ones."""
     is_count = isinstance(pieces_per_revolution, int) and pieces_per_revolution >= 1
     if not is_count or per_revolution % pieces_per_revolution:
         problem = f"{pieces_per_revolution} is not a divisor of the {per_revolution} samples in a revolution"
@@ -144,11 +138,6 @@ def cut(
     -------
     (n_piece + 1,)
         Samples between which the pieces lie, from 0 to the end of the last whole revolution.
-
-    Raises
-    ------
-    InputError
-        `pieces_per_revolution` is not a divisor of the samples in a revolution.
     """
     n = law.n_revolution
     if pieces_per_revolution is not None:

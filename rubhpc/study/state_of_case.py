@@ -14,11 +14,11 @@ from rubhpc.input.messages import brief
 from rubhpc.input.quantity import parse_quantity
 from rubhpc.rig.reading import rig_from_dict, with_keys
 from rubhpc.schema import DONE, FINAL_STATE, STATUS
-from rubhpc.study.axes import coordinate_of, is_of_table, place_of, study_unit
+from rubhpc.study.axes import axis_table, coordinate_of, place_of, study_unit
 from rubhpc.study.stored_state import StoredState
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     import zarr
     from numpy.typing import NDArray
@@ -31,13 +31,7 @@ _MOST_WRITTEN = 6  # values of an axis in a message
 
 
 def with_state(initial: Initial) -> Initial:
-    """Return a start from a case of a store with the state that it names, read unless it has been.
-
-    Raises
-    ------
-    InputError
-        It cannot be read.
-    """
+    """Return a start from a case of a store with the state that it names, read unless it has been."""
     if initial.state is not None:
         return initial
     return replace(initial, state=read_state(initial.from_, initial.select))
@@ -52,11 +46,6 @@ def read_state(path: str, select: Selection) -> StoredState:
         A store whose study keeps final states.
     select : sequence of (axis, value)
         Numbers in SI units or text, as of `--select`; axes of one value need none.
-
-    Raises
-    ------
-    InputError
-        There is no such store or case, it keeps no final states, or the case is not done.
     """
     where = f"[initial] from: {path}"
     if not Path(path).exists():
@@ -88,8 +77,9 @@ def _read_state(path: str, select: Selection, where: str) -> StoredState:
         at = ", ".join(f"{name} = {value:g}" for name, value in chosen.items())
         what = STATUS[status] if status != DONE else "not packed yet"
         raise InputError(f"{where}: the case {at} is {what}; select another, or run its study to the end")
-    grid: Any = group.attrs["study"]
-    keys = {name: chosen[coordinate_of(name)] for name in _rig_keys(grid) if coordinate_of(name) in chosen}
+    study: Any = group.attrs["study"]
+    of_rig = [name for name in study.get("grid", {}) if "." in name and not axis_table(name)]
+    keys = {name: chosen[coordinate_of(name)] for name in of_rig if coordinate_of(name) in chosen}
     return StoredState.of(values, assemble(with_keys(rig_from_dict(rig, f"{path}: rig"), keys)))
 
 
@@ -106,7 +96,8 @@ def _find_case(
         axis = _array(group, dim)
         values = np.asarray(axis[:], dtype=np.float64)
         if dim not in wanted and values.size > 1:
-            example = f"select = {{ {_key(dim)} = {_written(axis, values[0])} }}"
+            key = dim if dim.isidentifier() else f'"{dim}"'
+            example = f"select = {{ {key} = {_written(axis, values[0])} }}"
             problem = f"{path} has {values.size} values of {dim}, from which one has to be selected"
             raise InputError(f"[initial] select: {problem}; write {example}")
         index.append(_nearest(axis, values, dim, wanted[dim]) if dim in wanted else 0)
@@ -145,12 +136,3 @@ def _array_dims(group: zarr.Group, name: str) -> tuple[str, ...]:
 def _written(axis: zarr.Array[Any], value: float) -> str:
     meanings = str(axis.attrs.get("flag_meanings", "")).split()
     return f'"{meanings[int(value)]}"' if meanings else f"{value:.6g}"
-
-
-def _key(dim: str) -> str:
-    return dim if dim.isidentifier() else f'"{dim}"'
-
-
-def _rig_keys(study: Mapping[str, Any]) -> list[str]:
-    """Axes of a stored study that are keys of its rig."""
-    return [name for name in study.get("grid", {}) if "." in name and not is_of_table(name)]

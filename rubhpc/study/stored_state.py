@@ -53,13 +53,7 @@ class StoredState:
         return hashlib.sha256(head + self.values).hexdigest()
 
     def check_fit(self, model: Model) -> None:
-        """Refuse a model whose bodies have other degrees of freedom.
-
-        Raises
-        ------
-        InputError
-            Names both.
-        """
+        """Refuse a model whose bodies have other degrees of freedom."""
         bodies, n_stator = _bodies_of(model), len(model.stators)
         if (bodies, n_stator) != (self.bodies, self.n_stator):
             mine, its = _in_words(self.bodies, self.n_stator), _in_words(bodies, n_stator)

@@ -18,7 +18,6 @@ from rubhpc.models import SECOND_ORDER, chosen, in_words
 from rubhpc.rig.reading import read_rig, with_keys
 from rubhpc.rig.stators import gap_problem, geometries
 from rubhpc.schema import VARIABLES
-from rubhpc.study import contact_axes
 from rubhpc.study.axes import (
     BOTH,
     CLEARANCE_AXES,
@@ -31,14 +30,14 @@ from rubhpc.study.axes import (
 )
 from rubhpc.study.axis_reading import flatten, make_axis, make_range, unit_of
 from rubhpc.study.branch_keys import BranchKeys, branch_axis, check_branch
-from rubhpc.study.contact_axes import check_contacts
 from rubhpc.study.contact_keys import Contact, ContactKeys
 from rubhpc.study.drive_keys import DriveKeys, check_drive, first_speed
-from rubhpc.study.initial import CONTACT_FREE, Initial, check_initials
+from rubhpc.study.initial import CONTACT_FREE, Initial
 from rubhpc.study.refine import Refine
 from rubhpc.study.run_up_keys import RunUpKeys, check_forces, check_run_up, refuse_speeds, speed_axis
 from rubhpc.study.sampling import draw
 from rubhpc.study.state_of_case import with_state
+from rubhpc.study.table_axes import check_contacts, check_initials, laws_of
 from rubhpc.study.tables import Integrator, Recording, Run, Sample, check_method
 
 if TYPE_CHECKING:
@@ -68,10 +67,13 @@ def table_of(table: dict[str, Any], key: str, file: str) -> dict[str, Any]:
     return value
 
 
-def overridden(rig: Rig, table: dict[str, Any], file: str) -> Rig:
-    """The rig with the values of [override]."""
+def rig_of(table: dict[str, Any], source: Path, *, trust_rig: bool) -> Rig:
+    """The rig that the tables of a file name, with the values of [override]."""
+    file = str(source)
+    name = line_of_text(table, "rig", "", file)
+    rig = read_rig(name, source.parent, place(file, "", "rig"), trust_rig=trust_rig)
     with located(f"{place(file, 'override')} "):
-        return with_keys(rig, dict(flatten(table)))
+        return with_keys(rig, dict(flatten(table_of(table, "override", file))))
 
 
 def read_branch(table: dict[str, Any], grid: dict[str, Any], rig: Rig, file: str) -> BranchKeys:
@@ -190,34 +192,11 @@ def _check_rig(rig: Rig, axes: tuple[Axis, ...]) -> None:
             raise InputError(f"[grid] clearance: {problem}")
 
 
-__all__ = [
-    "Axis",
-    "Contact",
-    "Integrator",
-    "Recording",
-    "Refine",
-    "Run",
-    "Sample",
-    "Study",
-    "draw",
-    "make_axis",
-    "make_range",
-    "read_study",
-]
-
 _TABLES = (
     *("title", "rig", "output", "grid", "sample", "refine", "branch", "run_up", "drive", "override"),
     *("contact", "initial", "integrator", "record", "run"),
 )
 _MOST_AXES = 32  # arrays have 64 dimensions at most
-
-
-DEFAULT_INITIAL, DEFAULT_INTEGRATOR, DEFAULT_RECORDING, DEFAULT_RUN = (
-    Initial(),
-    Integrator(),
-    Recording(),
-    Run(),
-)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -267,10 +246,10 @@ class Study:
     run_up: RunUpKeys | None = None
     drive: DriveKeys | None = None
     contact: ContactKeys = field(default_factory=Contact)
-    initial: Initial = DEFAULT_INITIAL
-    integrator: Integrator = DEFAULT_INTEGRATOR
-    recording: Recording = DEFAULT_RECORDING
-    run: Run = DEFAULT_RUN
+    initial: Initial = field(default_factory=Initial)
+    integrator: Integrator = field(default_factory=Integrator)
+    recording: Recording = field(default_factory=Recording)
+    run: Run = field(default_factory=Run)
     output: Path
     source: Path | None = None
 
@@ -293,8 +272,8 @@ class Study:
         check_axes(self.axes)
         if self.refine is not None:
             self.refine.refined(self.axes)
-        contacts = check_contacts(self.contact, [axis for axis in self.axes if axis.is_contact_key])
-        check_initials(self.initial, [axis for axis in self.axes if axis.is_initial_key])
+        contacts = check_contacts(self.contact, [axis for axis in self.axes if axis.table == "contact"])
+        check_initials(self.initial, [axis for axis in self.axes if axis.table == "initial"])
         if self.branch is not None:
             beside = [name for name in ("sample", "refine") if getattr(self, name) is not None]
             check_branch(self.branch, self.axes, self.integrator, self.recording, beside)
@@ -310,7 +289,7 @@ class Study:
     @property
     def model(self) -> str:
         """The normal, friction law and geometry of stators that its cases use, in words."""
-        normals, laws = (contact_axes.laws_of(self.contact, self.axes, k) for k in ("normal", "friction_law"))
+        normals, laws = (laws_of(self.contact, self.axes, k) for k in ("normal", "friction_law"))
         return in_words(normals, laws, geometries(self._freest_stators))
 
     @property
@@ -333,6 +312,7 @@ class Study:
 
         Where and how it is run is left out: two runs of one study give the same.
         """
+        own = {"branch": self.branch, "run_up": self.run_up, "drive": self.drive}
         return {
             "title": self.title,
             "rig": self.rig.name,
@@ -344,15 +324,13 @@ class Study:
                 if axis.name != DIRECTION and not (self.changes_speed and axis.name in SPEED_AXES)
             },
             **({"sample": self.sample.as_dict()} if self.sample else {}),
-            **({"branch": asdict(self.branch)} if self.branch else {}),
-            **({"run_up": asdict(self.run_up)} if self.run_up else {}),
-            **({"drive": asdict(self.drive)} if self.drive else {}),
+            **{name: asdict(keys) for name, keys in own.items() if keys},
             "contact": {
                 key: value
                 for key, value in asdict(self.contact).items()
-                if value is not None and contact_axes.PREFIX + key not in {axis.name for axis in self.axes}
+                if value is not None and f"contact.{key}" not in {axis.name for axis in self.axes}
             },
-            **({"initial": plain(self.initial)} if self.initial != DEFAULT_INITIAL else {}),
+            **({"initial": plain(self.initial)} if self.initial != Initial() else {}),
             "integrator": asdict(self.integrator),
             "record": self.recording.as_dict() | {"keep": list(self.recording.keep)},
         }
@@ -401,10 +379,7 @@ def study_of(
         raise InputError(
             f'{place(file, "", "rig")}: missing; add rig = "mokhtar2017", or the path of a rig file'
         )
-    rig = read_rig(
-        line_of_text(table, "rig", "", file), source.parent, place(file, "", "rig"), trust_rig=trust_rig
-    )
-    rig = overridden(rig, table_of(table, "override", file), file)
+    rig = rig_of(table, source, trust_rig=trust_rig)
     kinds = {"sample": Sample, "refine": Refine, "run_up": RunUpKeys, "drive": DriveKeys}
     given: Any = {name: build(kinds[name], table[name], file, name) for name in kinds if name in table}
     sample, run_up, drive = given.get("sample"), given.get("run_up"), given.get("drive")
@@ -424,7 +399,7 @@ def study_of(
         for key in table_of(table, name, file):
             if f"{name}.{key}" in {axis.name for axis in axes}:
                 raise InputError(f"{place(file, name, key)}: is also an axis of the grid; remove one")
-    is_varied = any(axis.is_contact_key for axis in axes)
+    is_varied = any(axis.table == "contact" for axis in axes)
     contact = build(ContactKeys if is_varied else Contact, table.get("contact", {}), file, "contact")
     starts = {"from": CONTACT_FREE} if run_up is not None or drive is not None else {}
     initial = build(Initial, starts | table_of(table, "initial", file), file, "initial")

@@ -47,7 +47,6 @@ class Integrator:
         "s",
         doc="Time step (central-difference), or the longest step of the search for events without a bound "
         "(modal).",
-        example='"0.5 us"',
         default=None,
         at_least=1e-9,  # of a thousandth of it no case would see its end
     )
@@ -74,11 +73,6 @@ def check_method(
     """Refuse what the central difference does not know, such as second-order stators, bores and Hertz's law.
 
     A bore is refused with the fixed normal too.
-
-    Raises
-    ------
-    InputError
-        Says what it needs instead.
     """
     bore = next((i for i, stator in enumerate(stators, 1) if stator.is_bore), None)
     if bore is not None and contact.normal == "fixed":

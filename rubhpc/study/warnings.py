@@ -13,16 +13,14 @@ from rubhpc.fem.statics import sag_remark
 from rubhpc.units import typed_quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
     from rubhpc.study.operating_points import OperatingPoints
 
 _RPM = 30 / math.pi
-_MOST_SAGS = (
-    4096  # pairs of rotor and speed whose sag is compared with the clearance; of more, an even spread
-)
+_MOST_SAGS = 4096  # pairs of rotor and speed whose sag is compared with the clearance, evenly spread
 _MOST_RIGS = 8  # whose modes are looked at; of more, an even spread
 
 
@@ -61,16 +59,10 @@ def _instability(points: OperatingPoints) -> str:
     unstable = np.argwhere(np.isnan(amplitude))
     if not unstable.size:
         return ""
-    at = [0] * len(points.points.dims)
-    speeds = []
-    for place in unstable:
-        for dim, i in zip(dims, place.tolist(), strict=True):
-            at[dim] = i
-        speeds.append(points.response(tuple(at))[0] * _RPM)
-        if len(speeds) == 1:
-            first = points.instability(tuple(at))
-    n = f"{len(unstable)} of {amplitude.size} operating points, {_span(np.array(speeds))}"
-    return f"at {n}: {first}"
+    cases = [_index(points, dims, place) for place in unstable]
+    speeds = np.array([points.response(at)[0] * _RPM for at in cases])
+    n = f"{len(unstable)} of {amplitude.size} operating points, {_span(speeds)}"
+    return f"at {n}: {points.instability(cases[0])}"
 
 
 def _sag(points: OperatingPoints) -> str:
@@ -82,11 +74,8 @@ def _sag(points: OperatingPoints) -> str:
     spread = every[np.unique(np.linspace(0, len(every) - 1, min(len(every), _MOST_SAGS)).round().astype(int))]
     worst, n_bad, text = 0.0, 0, ""
     for place in spread:
-        at = [0] * len(points.points.dims)
-        for dim, i in zip(dims, place.tolist(), strict=True):
-            at[dim] = i
         gap = clearance[tuple(place)]
-        overlap = points.sag_beyond(tuple(at), float(gap))
+        overlap = points.sag_beyond(_index(points, dims, place), float(gap))
         n_bad += overlap > 0.0
         if overlap > worst:
             worst = overlap
@@ -116,10 +105,13 @@ def _some_rigs(points: OperatingPoints) -> Iterator[tuple[int, ...]]:
     sizes = [points.points.shape[dim] for dim in dims]
     n_rig = math.prod(sizes)
     for number in np.unique(np.linspace(0, n_rig - 1, min(n_rig, _MOST_RIGS)).round().astype(int)):
-        at = [0] * len(points.points.dims)
-        for dim, i in zip(dims, np.unravel_index(number, sizes), strict=True):
-            at[dim] = int(i)
-        yield tuple(at)
+        yield _index(points, dims, np.unravel_index(number, sizes))
+
+
+def _index(points: OperatingPoints, dims: Sequence[int], place: Iterable[int]) -> tuple[int, ...]:
+    """The index of a case from its place along some dimensions, 0 along the others."""
+    along = dict(zip(dims, map(int, place), strict=True))
+    return tuple(along.get(dim, 0) for dim in range(len(points.points.dims)))
 
 
 def _length(size: float) -> str:

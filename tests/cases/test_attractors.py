@@ -1,7 +1,5 @@
 """Motions that starts reach, distinguished in synthetic sections of known motions; intervals; entropy."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,9 +20,6 @@ from rubhpc.schema import DIVERGED, DONE, MISSING
 from rubhpc.study.axis_reading import make_range
 from rubhpc.study.sampling import draw
 from rubhpc.study.tables import Sample
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 # The second of the three is the one of the logarithm, so that the order of the columns shows.
 RANGES = {
@@ -70,7 +67,7 @@ def shares(found: xr.Dataset) -> np.ndarray:
     return found[["first_order", "total"]].to_dataarray().sel(axis=NAMES).values
 
 
-def test_ishigami_function_has_its_indices() -> None:
+def test_ishigami_function_has_its_indices():
     store = sample_of_sines(4096)
     assert drawn_axes(store) == NAMES
     found = sensitivity(store, "peak_torsion", n_draw=20)
@@ -83,7 +80,7 @@ def test_ishigami_function_has_its_indices() -> None:
     assert found.attrs["standard_deviation"] == pytest.approx(np.sqrt(_V1 + _V2 + _V13), rel=0.01)
 
 
-def test_intervals_hold_the_indices() -> None:
+def test_intervals_hold_the_indices():
     """Of 20 samples of 64 points, 97 in 100 did, by bootstrap: a count of 120, not all independent."""
     held = []
     for seed in range(1, 21):
@@ -93,14 +90,14 @@ def test_intervals_hold_the_indices() -> None:
     assert 0.9 <= np.mean(held) <= 1.0
 
 
-def test_draws_are_repeatable_also_with_the_seed_0() -> None:
+def test_draws_are_repeatable_also_with_the_seed_0():
     store = sample_of_sines(64)
     one, again, other = (sensitivity(store, "peak_torsion", n_draw=50, seed=s) for s in (0, 0, 1))
     xr.testing.assert_identical(one, again)
     assert not np.array_equal(one["total_high"], other["total_high"])
 
 
-def test_a_point_with_a_case_missing_is_left_out_whole_and_reported() -> None:
+def test_a_point_with_a_case_missing_is_left_out_whole_and_reported():
     store = sample_of_sines(1024)
     whole = shares(sensitivity(store, "peak_torsion", n_draw=2))
     store["status"][0, [7, 8, 501]] = [DIVERGED, MISSING, DIVERGED]
@@ -115,7 +112,7 @@ def test_a_point_with_a_case_missing_is_left_out_whole_and_reported() -> None:
     assert 0 < np.abs(shares(found) - whole).max() < 0.01
 
 
-def test_too_many_cases_without_a_value_are_refused() -> None:
+def test_too_many_cases_without_a_value_are_refused():
     store = sample_of_sines(64)
     store["status"][0, : 5 * 32 : 5] = DIVERGED
     assert sensitivity(store, "peak_torsion", n_draw=2).attrs["dropped"] == 160
@@ -125,7 +122,7 @@ def test_too_many_cases_without_a_value_are_refused() -> None:
         sensitivity(store, "peak_torsion")
 
 
-def test_too_many_points_are_refused_though_few_cases_lack_a_value() -> None:
+def test_too_many_points_are_refused_though_few_cases_lack_a_value():
     idle = {f"stator.{key}": {"start": 0.004, "stop": 0.006} for key in ("length", "width", "height")}
     store = sample_of_sines(64, ranges=RANGES | idle)
     store["status"][0, : 8 * 32 : 8] = DIVERGED
@@ -138,13 +135,13 @@ def test_too_many_points_are_refused_though_few_cases_lack_a_value() -> None:
         sensitivity(store, "peak_torsion")
 
 
-def test_part_of_a_sample_has_no_indices() -> None:
+def test_part_of_a_sample_has_no_indices():
     store = sample_of_sines(16)
     with pytest.raises(InputError, match="40 of the 80 cases of the sample are selected"):
         sensitivity(store.isel(case=slice(40)), "peak_torsion")
 
 
-def test_bars_reach_beyond_the_shares() -> None:
+def test_bars_reach_beyond_the_shares():
     found = sensitivity(sample_of_sines(8), "peak_torsion")
     ax = draw_bars(found, Figure().subplots())
     low = min(float(found[f"{name}_low"].min()) for name in ("first_order", "total"))
@@ -154,7 +151,7 @@ def test_bars_reach_beyond_the_shares() -> None:
     assert ax.get_xlim()[1] > high
 
 
-def test_command_shows_ranges(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_command_shows_ranges(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     sample_of_sines(64).to_zarr("sines.zarr")
     said = printed("sensitivity", "sines.zarr", "--measure", "peak_torsion", "--data", "shares.csv")

@@ -21,9 +21,6 @@ from rubhpc.errors import InputError
 from rubhpc.schema import DIVERGED, DONE, FAILED
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
     from numpy.typing import NDArray
 
 AXES = ("speed_ratio", "clearance_ratio", "friction")
@@ -67,7 +64,7 @@ def shares(found: xr.Dataset) -> NDArray[np.float64]:
     return found[["first_order", "total"]].to_dataarray().sel(axis=list(AXES)).values
 
 
-def test_ishigami_function_in_a_store_has_its_indices() -> None:
+def test_ishigami_function_in_a_store_has_its_indices():
     found = sensitivity(sines(48), "peak_torsion", n_draw=2)
     # Middles of 48 parts are a rule of second order: 24 are off by 4e-3, these by a quarter of it.
     assert np.abs(shares(found) - ISHIGAMI).max() < 1.2e-3
@@ -75,13 +72,13 @@ def test_ishigami_function_in_a_store_has_its_indices() -> None:
     assert found.attrs["interactions"] == pytest.approx(ISHIGAMI[1, 2], abs=2e-3)
 
 
-def test_error_falls_with_the_square_of_the_levels() -> None:
+def test_error_falls_with_the_square_of_the_levels():
     errors = [np.abs(grid_indices(ishigami(*(middles(n),) * 3)) - ISHIGAMI).max() for n in (12, 24, 48)]
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2, abs=0.1)
     assert np.log2(errors[1] / errors[2]) == pytest.approx(2, abs=0.1)
 
 
-def test_linear_function_shares_its_variance_exactly() -> None:
+def test_linear_function_shares_its_variance_exactly():
     axes = (np.linspace(0.9, 6.1, 7), np.array([0.7, 0.85]), np.array([0.1, 0.2, 0.5]))
     slopes = (2.0, -30.0, 5.0)
     parts = np.meshgrid(*(slope * axis for slope, axis in zip(slopes, axes, strict=True)), indexing="ij")
@@ -91,7 +88,7 @@ def test_linear_function_shares_its_variance_exactly() -> None:
     assert found.attrs["interactions"] == pytest.approx(0, abs=1e-8)
 
 
-def test_any_table_has_the_indices_that_saltelli_sampling_tends_to() -> None:
+def test_any_table_has_the_indices_that_saltelli_sampling_tends_to():
     values = np.random.default_rng(3).gamma(2.0, size=(4, 3, 5)) + np.arange(4)[:, None, None]
     problem = {"num_vars": 3, "names": list(AXES), "bounds": [[0, 1]] * 3}
     points = sobol_sample.sample(problem, 2**13, calc_second_order=False, seed=1)
@@ -104,7 +101,7 @@ def test_any_table_has_the_indices_that_saltelli_sampling_tends_to() -> None:
     assert max(estimate["S1_conf"].max(), estimate["ST_conf"].max()) < 0.04
 
 
-def test_weights_of_levels_stand_for_levels_taken_again() -> None:
+def test_weights_of_levels_stand_for_levels_taken_again():
     values = np.random.default_rng(4).normal(size=(3, 4, 2))
     counts = (np.array([2, 0, 1]), np.array([1, 1, 0, 2]), np.array([1, 3]))
     again = values
@@ -114,7 +111,7 @@ def test_weights_of_levels_stand_for_levels_taken_again() -> None:
     np.testing.assert_allclose(weighted, grid_indices(again), atol=1e-12)
 
 
-def test_intervals_hold_the_indices_of_the_range() -> None:
+def test_intervals_hold_the_indices_of_the_range():
     """Of studies at levels drawn at random, 95 % intervals hold the range's indices about as often."""
     random = np.random.default_rng(0)
     inside = []
@@ -128,7 +125,7 @@ def test_intervals_hold_the_indices_of_the_range() -> None:
     assert 0.86 < np.mean(inside) <= 1.0
 
 
-def test_draws_are_repeatable_and_shrink_with_the_levels() -> None:
+def test_draws_are_repeatable_and_shrink_with_the_levels():
     def width(found: xr.Dataset) -> float:
         return float((found["total_high"] - found["total_low"]).max())
 
@@ -150,7 +147,7 @@ def without(store: xr.Dataset, share: float) -> xr.Dataset:
     return store
 
 
-def test_a_measure_that_is_zero_in_most_cases_has_its_intervals() -> None:
+def test_a_measure_that_is_zero_in_most_cases_has_its_intervals():
     values = np.zeros((6, 5, 4))
     values[4:, 3:, :] = [1.0, 1.5, 2.0, 2.5]  # rub in a corner; draws of levels that miss it say nothing
     axes = tuple(np.arange(float(n)) for n in values.shape)
@@ -161,7 +158,7 @@ def test_a_measure_that_is_zero_in_most_cases_has_its_intervals() -> None:
     assert (ends[3] > ends[2]).all()
 
 
-def test_cases_without_a_value_are_filled_and_reported() -> None:
+def test_cases_without_a_value_are_filled_and_reported():
     store = without(sines(20), share=0.05)
     whole = grid_indices(ishigami(*(middles(20),) * 3))
     found = sensitivity(store, "peak_torsion", n_draw=2)
@@ -174,14 +171,14 @@ def test_cases_without_a_value_are_filled_and_reported() -> None:
     ]
 
 
-def test_fill_is_exact_where_axes_do_not_act_together() -> None:
+def test_fill_is_exact_where_axes_do_not_act_together():
     axes = (np.arange(6.0), np.arange(4.0) ** 2, np.array([0.0, 3.0, 4.0]))
     values = sum(np.meshgrid(*axes, indexing="ij"))
     found = sensitivity(without(store_of(values.copy(), axes), share=0.09), "peak_torsion", n_draw=2)
     np.testing.assert_allclose(shares(found), grid_indices(values), atol=1e-7)
 
 
-def test_level_without_cases_is_left_out_and_reported() -> None:
+def test_level_without_cases_is_left_out_and_reported():
     store = sines(6)
     store["status"][{"friction": 2}] = FAILED
     found = sensitivity(store, "peak_torsion", n_draw=2)
@@ -202,27 +199,19 @@ def test_level_without_cases_is_left_out_and_reported() -> None:
         (lambda store: store.drop_vars("peak_torsion"), "no variable peak_torsion; "),
     ],
 )
-def test_what_has_no_indices_is_refused(spoil: Callable[[xr.Dataset], xr.Dataset], said: str) -> None:
+def test_what_has_no_indices_is_refused(spoil, said):
     with pytest.raises(InputError) as refusal:
         sensitivity(spoil(sines(6)), "peak_torsion")
     assert said in str(refusal.value)
     assert "\n" not in str(refusal.value)
 
 
-@pytest.mark.parametrize(
-    ("measure", "said"),
-    [
-        ("status", "status: is not a measure; choose"),
-        ("peak_torson", "did you mean peak_torsion?"),
-    ],
-)
-def test_measure_has_to_be_one(measure: str, said: str) -> None:
-    with pytest.raises(InputError) as refusal:
-        sensitivity(sines(6), measure)
-    assert said in str(refusal.value)
+def test_measure_has_to_be_one():
+    with pytest.raises(InputError, match="status: is not a measure; choose"):
+        sensitivity(sines(6), "status")
 
 
-def test_bars_are_as_long_as_the_shares() -> None:
+def test_bars_are_as_long_as_the_shares():
     found = sensitivity(sines(12), "peak_torsion", n_draw=20)
     ax = draw_bars(found, Figure().subplots())
     total, first = (np.array([bar.get_width() for bar in group]) for group in ax.containers[::2])
@@ -231,7 +220,7 @@ def test_bars_are_as_long_as_the_shares() -> None:
     assert ax.get_yticklabels()[0].get_text() == "Speed ratio $r$"
 
 
-def test_command_shows_draws_and_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_command_shows_draws_and_writes(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     without(sines(8), share=0.05).to_zarr("study.zarr", zarr_format=3, consolidated=False)
     words = ["study.zarr", "--measure", "peak_contact_force", "--select", "stator=2", "--draws", "20"]

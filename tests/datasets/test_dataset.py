@@ -22,14 +22,13 @@ from rubhpc.study.study import read_study
 if TYPE_CHECKING:
     from pathlib import Path
 
-    import xarray as xr
 
 SMALL = {"n_sample": 64, "n_draw": 2}
 FREE = 1.7  # speed ratio without contact
 
 
 @pytest.fixture(scope="module")
-def store() -> xr.Dataset:
+def store():
     """The synthetic store: 60 cases, 57 with a result; those at the highest speed touch nothing."""
     made = synthetic_store.make()
     for name in ("contact_force", "peak_contact_force", "contact_fraction", "friction_work"):

@@ -12,10 +12,8 @@ from rubhpc.fem.beam import (
     rotor_elements,
     shear_coefficient_circle,
     shear_coefficient_rectangle,
-    stator_element,
 )
 from rubhpc.rig.parts import ShaftSection
-from rubhpc.rig.stators import Stator
 
 LENGTH = 0.13
 STEEL = {"youngs_modulus": 2.1e11, "shear_modulus": 8e10, "density": 7800.0}
@@ -132,18 +130,3 @@ def test_shear_coefficients_of_circles_and_rectangles():
     assert shear_coefficient_circle(nu, 0.9999) == pytest.approx(2 * 1.3 / 4.9, rel=1e-7)
     assert shear_coefficient_rectangle(nu) == pytest.approx(0.849673, abs=1e-6)
     assert shear_coefficient_rectangle(0.0) == pytest.approx(5 / 6)
-
-
-def test_stator_element_bends_about_its_width():
-    stator = Stator(
-        node=1, length=0.04, width=0.003, height=0.006, elements=1, youngs_modulus=3e9, density=1200.0
-    )
-    element = stator_element(stator)
-    # tip held against rotation and free to move: 12 E I / (L^3 (1 + phi)), with I across the height
-    second_moment = 0.003 * 0.006**3 / 12
-    shear_rigidity = shear_coefficient_rectangle(0.3) * 3e9 / 2.6 * 0.003 * 0.006
-    compliance = 0.04**3 / (12 * 3e9 * second_moment) + 0.04 / shear_rigidity
-    assert element.stiffness[4, 4] == pytest.approx(1 / compliance)
-    assert element.stiffness[3, 3] == pytest.approx(3e9 * 0.003 * 0.006 / 0.04)
-    pushed = np.array([0.0, 1, 0, 0, 1, 0])
-    assert pushed @ element.mass @ pushed == pytest.approx(1200 * 0.003 * 0.006 * 0.04)

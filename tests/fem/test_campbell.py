@@ -53,11 +53,6 @@ def test_curves_keep_their_whirl_and_run_smoothly(curves):
     assert slopes[backward].max() < 1e-6
 
 
-def test_torsion_does_not_mind_the_spin(curves):
-    torsion = curves["frequency"].values[curves["kind"].values == "torsional"]
-    assert np.ptp(torsion, axis=1) == pytest.approx(0.0, abs=1e-6)
-
-
 def test_diagram_draws_each_motion_in_its_own_style(overhung, curves):
     shown = curves.isel(mode=curves["kind"].values != "axial").isel(mode=slice(5))
     ax = Figure().subplots()

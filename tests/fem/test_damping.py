@@ -15,10 +15,6 @@ def ratio(coefficients, frequency):
     return alpha / (2 * omega) + beta * omega / 2
 
 
-def test_given_coefficients_are_taken_as_they_are():
-    assert rayleigh_coefficients(Damping(alpha=3.0, beta=2e-5)) == (3.0, 2e-5)
-
-
 def test_one_ratio_is_met_by_the_mass_alone():
     alpha, beta = rayleigh_coefficients(Damping(ratios=((31.56, 0.08),)))
     assert beta == 0.0

@@ -8,7 +8,6 @@ import pytest
 from closed_form import read_rig
 from trial_rig import trial_rig
 
-import rubhpc
 from rubhpc import InputError, Rig, Unbalance, assemble
 from rubhpc.fem.assemble import model_at
 from rubhpc.fem.linear_design import linear_design
@@ -104,13 +103,6 @@ def test_a_rotor_without_an_unbalance_has_no_peak():
     assert not found.major_axis.any()
 
 
-def test_unbalance_at_another_node_changes_what_is_excited():
-    at_end = linear_design(
-        rig(unbalance=(Unbalance(node=2, mass=0.01, radius=0.1),)), (0.0, 600.0), n_speed=7
-    )
-    assert at_end.is_excited.any()
-
-
 @pytest.mark.parametrize(
     ("given", "message"),
     [
@@ -123,10 +115,6 @@ def test_unbalance_at_another_node_changes_what_is_excited():
 def test_what_is_no_request_is_refused(given, message):
     with pytest.raises(InputError, match=message):
         linear_design(rig(), **given)
-
-
-def test_public_name():
-    assert rubhpc.linear_design is linear_design
 
 
 def test_an_undamped_rotor_has_a_design():

@@ -8,7 +8,7 @@ import pytest
 from closed_form import read_rig
 
 from rubhpc.fem.assemble import assemble
-from rubhpc.fem.modes import modes, whirl_index, whirl_word
+from rubhpc.fem.modes import modes, whirl_word
 from rubhpc.fem.rotor import assemble_rotor
 from rubhpc.rig.parts import Bearing, Damping, Disc, ShaftSection, Torsion
 from rubhpc.rig.rig import Rig
@@ -90,13 +90,6 @@ def test_reversed_spin_mirrors_the_modes():
     for one, other in zip(lateral(body, 800.0), lateral(body, -800.0), strict=True):
         assert one.frequency == pytest.approx(other.frequency, rel=1e-9)
         assert one.whirl == other.whirl
-    names = [name for _, name in body.degrees]
-    rows = [row for row, name in enumerate(names) if name in ("v", "w", "thy", "thz")]
-    mass, names = body.mass[np.ix_(rows, rows)], [names[row] for row in rows]
-    for spin in (800.0, -800.0):
-        fastest = lateral(body, spin)[-1]
-        assert fastest.whirl == "forward"
-        assert whirl_index(fastest.shape[rows], mass, names) == pytest.approx(math.copysign(1.0, spin))
 
 
 def test_equal_modes_are_given_as_a_vertical_and_a_horizontal_one():
@@ -218,18 +211,6 @@ def test_creeping_bearing_pairs_with_its_own_fast_root():
     assert sorted(mode.eigenvalue.real for mode in creeping) == pytest.approx([-20, -10, -10, -10], rel=0.01)
     # paired with one another they would come out near 1.06
     assert min(mode.damping_ratio for mode in creeping) > 30
-
-
-def test_whirl_index_of_known_orbits():
-    names, mass = ["v", "w", "thy", "thz"], np.diag([2.0, 2.0, 0.1, 0.1])
-    circle = np.array([1.0, -1j, 0, 0])  # v = cos, w = sin: from y to z
-    tilt = np.array([0, 0, -1j, -1.0]) / 1j  # thz = -sin, -thy = cos: the tilt turns likewise
-    assert whirl_index(circle, mass, names) == pytest.approx(1.0)
-    assert whirl_index(circle.conj(), mass, names) == pytest.approx(-1.0)
-    assert whirl_index(tilt, mass, names) == pytest.approx(1.0)
-    assert whirl_index(np.array([1.0, 2.0, 0.3, 0.1]), mass, names) == pytest.approx(0.0)
-    # an ellipse with half axes 3 and 1: (2^2 - 1^2) / (2^2 + 1^2), forward circle 2 and backward 1
-    assert whirl_index(np.array([3.0, -1j, 0, 0]), mass, names) == pytest.approx(0.6)
 
 
 @pytest.mark.parametrize(

@@ -96,12 +96,6 @@ def test_torsional_spring_and_damper_resist_a_turn_of_the_whole_shaft():
     assert turn @ body.damping @ turn == pytest.approx(0.3)
 
 
-def test_free_shaft_turns_without_force():
-    body = assemble_rotor(replace(ROTOR, torsion=Torsion(free=True)))
-    turn = rigid_translation(body, "thx")
-    assert np.abs(body.stiffness @ turn).max() < 1e-9 * np.abs(body.stiffness).max()
-
-
 def test_unbalance_turns_from_y_to_z_ahead_by_its_phase():
     phase, moment = 0.8, 2e-3 * 0.05
     rotor = replace(ROTOR, unbalance=(Unbalance(node=4, mass=2e-3, radius=0.05, phase=phase),))

@@ -32,20 +32,19 @@ def jeffcott(ratio, mass=3.0):
     )
 
 
-def peaks_of(model, low=1.0, high=400.0, **probe):
+def peaks_of(model, low=1.0, high=400.0):
     critical = find_critical_speeds(model, np.linspace(low, high, 21))
-    return response_peaks(amplitude_over_speed(model, 1, **probe), grid_through(low, high, critical))
+    return response_peaks(amplitude_over_speed(model, 1), grid_through(low, high, critical))
 
 
 @pytest.mark.parametrize("ratio", [1e-6, 1e-3, 0.02, 0.1, 0.3])
-@pytest.mark.parametrize("probe", [{}, {"probe": 0.7}])
-def test_jeffcott_rotor_in_closed_form(ratio, probe):
+def test_jeffcott_rotor_in_closed_form(ratio):
     """|u| = e r^2 / sqrt((1 - r^2)^2 + 4 z^2 r^2), in x = 1 / r^2: x^2 - 2 (1 - 2 z^2) x + 1 at its least.
 
     The peak is at x = 1 - 2 z^2, e / (2 z sqrt(1 - z^2)) high, and half as much power is at
     x = 1 - 2 z^2 -+ 2 z sqrt(1 - z^2).
     """
-    (peak,) = peaks_of(jeffcott(ratio), **probe)
+    (peak,) = peaks_of(jeffcott(ratio))
     middle, half = 1 - 2 * ratio**2, 2 * ratio * math.sqrt(1 - ratio**2)
     assert peak.speed == pytest.approx(OMEGA / math.sqrt(middle), rel=max(1e-8, 1e-4 * ratio))
     assert peak.amplitude == pytest.approx(ECCENTRICITY / half, rel=1e-8)
@@ -55,12 +54,6 @@ def test_jeffcott_rotor_in_closed_form(ratio, probe):
         above = OMEGA / math.sqrt(middle - half)
         assert peak.half_power_speeds[1] == pytest.approx(above, rel=1e-9)
         assert peak.amplification_factor == pytest.approx(peak.speed / (above - below), rel=1e-6)
-
-
-@pytest.mark.parametrize("ratio", [1e-3, 0.01, 0.03])
-def test_amplification_factor_is_half_the_inverse_damping_ratio(ratio):
-    (peak,) = peaks_of(jeffcott(ratio))
-    assert peak.amplification_factor == pytest.approx(1 / (2 * ratio), rel=4 * ratio)
 
 
 def test_phase_lags_a_quarter_at_the_natural_frequency():
@@ -132,8 +125,3 @@ def test_a_peak_at_the_end_of_the_range_has_no_factor_and_asks_for_the_most():
     assert math.isnan(found.amplification_factor)
     assert found.required_margin((150.0, 200.0)) == 0.16
     assert found.required_margin((50.0, 80.0)) == 0.26
-
-
-def test_a_narrow_peak_is_found_between_coarse_speeds():
-    (found,) = peaks_of(jeffcott(1e-5))
-    assert found.amplification_factor == pytest.approx(5e4, rel=1e-4)

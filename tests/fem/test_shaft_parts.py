@@ -101,16 +101,6 @@ def test_a_conical_cantilever_sags_and_vibrates_as_known():
     assert lowest * length**2 / math.sqrt(E * second / (rho * area)) == pytest.approx(8.7193, rel=1e-4)
 
 
-def test_poissons_ratio_gives_the_shear_modulus(packaged):
-    (section,) = packaged.rotor.shaft
-    shear = section.youngs_modulus / (2 * (1 + 0.29))
-    by_modulus = with_parts(packaged, shaft=(replace(section, shear_modulus=shear),))
-    by_ratio = with_parts(packaged, shaft=(replace(section, shear_modulus=None, poissons_ratio=0.29),))
-    for name in MATRICES:
-        one, other = (getattr(assemble(rig).rotor, name) for rig in (by_modulus, by_ratio))
-        assert np.array_equal(one, other)
-
-
 def test_a_sleeve_of_the_shafts_material_is_a_thicker_shaft(packaged):
     """Of Rayleigh beams, whose second moments of area add up."""
     (section,) = packaged.rotor.shaft

@@ -1,7 +1,5 @@
 """Figures of basins: cells, shares along an axis, points of a sample; what the command prints and refuses."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -17,7 +15,7 @@ FIGURE = figures()["basins"]
 
 
 @pytest.fixture
-def plane() -> xr.Dataset:
+def plane():
     kinds = np.where(np.indices((6, 7)).sum(axis=0) < 6, "free", "P1")
     store = store_of(
         kinds, initial_vertical=np.linspace(-1, 1, 6) * 1e-4, initial_horizontal=np.linspace(-1, 1, 7) * 1e-4

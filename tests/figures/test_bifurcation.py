@@ -5,7 +5,6 @@ import pytest
 import synthetic_store
 import xarray as xr
 from matplotlib.colors import to_rgba
-from matplotlib.figure import Figure
 from printing import printed
 
 from postproc.figures.bifurcation import default_axis, draw_bifurcation, draw_simulated
@@ -17,13 +16,30 @@ from rubhpc.errors import InputError
 from rubhpc.schema import DIVERGED, DONE, REGIME
 
 CHOICE = {"clearance": "84 um", "friction": 0.3, "stator.youngs_modulus": "30 GPa"}
+UNFINISHED = {"clearance": "70 um", "friction": 0.1, "stator.youngs_modulus": "3 GPa"}
 SPEEDS = synthetic_store.AXES["speed_ratio"][2]
 POINTS = synthetic_store.REVOLUTIONS
 
 
 @pytest.fixture
-def ax():
-    return Figure(layout="constrained").subplots()
+def store(synthetic_path):
+    return select(open_store(synthetic_path), CHOICE)
+
+
+@pytest.fixture
+def data(store):
+    return sections_along(store, "vertical", "speed_ratio").load()
+
+
+@pytest.fixture
+def unfinished(synthetic_path):
+    return sections_along(select(open_store(synthetic_path), UNFINISHED), "vertical", "speed_ratio")
+
+
+def both_ways(data):
+    """The same of a sweep up and down."""
+    flags = xr.DataArray([0, 1], dims="direction", attrs={"flag_meanings": "up down"})
+    return data.expand_dims(direction=[0, 1]).copy(deep=True).assign_coords(direction=flags)
 
 
 def drawn(ax):
@@ -31,8 +47,7 @@ def drawn(ax):
     return {line.get_label(): np.unique(line.get_xdata()) for line in ax.lines}
 
 
-def test_points_have_the_colour_of_their_regime(synthetic_path, ax):
-    data = sections_along(select(open_store(synthetic_path), CHOICE), "vertical", "speed_ratio")
+def test_points_have_the_colour_of_their_regime(data, ax):
     assert draw_bifurcation(data, "vertical", ax) is ax
     expected = {name: [] for name in ("no contact", "periodic", "quasi-periodic", "chaotic")}
     for speed, code in zip(SPEEDS, synthetic_store.REGIMES, strict=True):
@@ -44,8 +59,7 @@ def test_points_have_the_colour_of_their_regime(synthetic_path, ax):
     assert "once a revolution (µm)" in ax.get_ylabel()
 
 
-def test_points_have_the_colour_of_their_period(synthetic_path, ax):
-    data = sections_along(select(open_store(synthetic_path), CHOICE), "vertical", "speed_ratio")
+def test_points_have_the_colour_of_their_period(data, ax):
     draw_bifurcation(data, "vertical", ax, "period")
     assert {name: list(at) for name, at in drawn(ax).items()} == {
         "none": [1.5, 1.7],
@@ -54,19 +68,14 @@ def test_points_have_the_colour_of_their_period(synthetic_path, ax):
     }
 
 
-def test_points_are_every_whole_revolution_of_the_waveform(synthetic_path, ax):
-    store = select(open_store(synthetic_path), CHOICE)
-    data = sections_along(store, "vertical", "speed_ratio")
+def test_points_are_every_whole_revolution_of_the_waveform(store, data, ax):
     draw_bifurcation(data, "vertical", ax, color=None)
     whole = store["vertical"].values[:, :: synthetic_store.SAMPLES]
     assert ax.lines[0].get_ydata() == pytest.approx(1e6 * whole.ravel(), rel=1e-6)
 
 
-def test_cases_that_are_not_done_leave_no_point(synthetic_path, ax):
-    one = {"clearance": "70 um", "friction": 0.1, "stator.youngs_modulus": "3 GPa"}
-    draw_bifurcation(
-        sections_along(select(open_store(synthetic_path), one), "vertical", "speed_ratio"), "vertical", ax
-    )
+def test_cases_that_are_not_done_leave_no_point(unfinished, ax):
+    draw_bifurcation(unfinished, "vertical", ax)
     values = synthetic_store.make()["status"].values[:, 0, 0, 0]
     there = np.concatenate(list(drawn(ax).values()))
     assert sorted(there) == [s for s, status in zip(SPEEDS, values, strict=True) if status == DONE]
@@ -83,10 +92,8 @@ def hatched(ax):
     }
 
 
-def test_cases_without_a_result_are_hatched_and_named(synthetic_path, ax):
-    one = {"clearance": "70 um", "friction": 0.1, "stator.youngs_modulus": "3 GPa"}
-    data = sections_along(select(open_store(synthetic_path), one), "vertical", "speed_ratio")
-    draw_bifurcation(data, "vertical", ax)
+def test_cases_without_a_result_are_hatched_and_named(unfinished, ax):
+    draw_bifurcation(unfinished, "vertical", ax)
     middle = (np.array(SPEEDS[1:]) + SPEEDS[:-1]) / 2
     assert {name: pytest.approx(ends) for name, ends in hatched(ax).items()} == {
         "diverged": (SPEEDS[0] - (middle[0] - SPEEDS[0]), middle[0]),
@@ -99,34 +106,27 @@ def test_cases_without_a_result_are_hatched_and_named(synthetic_path, ax):
     assert ax.get_ylim()[1] < 400  # µm: the hatch has the height of the panel, whatever it is
 
 
-def test_of_a_sweep_both_ways_those_of_each_are_hatched(synthetic_path, ax):
-    one = {"clearance": "84 um", "friction": 0.1, "stator.youngs_modulus": "3 GPa"}
-    data = sections_along(select(open_store(synthetic_path), one), "vertical", "speed_ratio").load()
-    flags = xr.DataArray([0, 1], dims="direction", attrs={"flag_meanings": "up down"})
-    data = data.expand_dims(direction=[0, 1]).copy(deep=True).assign_coords(direction=flags)
-    data["status"][1, -1] = DIVERGED
-    draw_bifurcation(data, "vertical", ax, "direction")
+def test_of_a_sweep_both_ways_those_of_each_are_hatched(data, ax):
+    swept = both_ways(data)
+    swept["status"][1, -1] = DIVERGED
+    draw_bifurcation(swept, "vertical", ax, "direction")
     assert list(hatched(ax)) == ["diverged, down"]
 
 
-def test_under_branches_the_marks_of_both_sweeps_stand_out(synthetic_path, ax):
+def test_under_branches_the_marks_of_both_sweeps_stand_out(data, ax):
     """A falling sweep lies on the line of its branch: its marks are wider than the line, and dark."""
-    data = sections_along(select(open_store(synthetic_path), CHOICE), "vertical", "speed_ratio").load()
-    flags = xr.DataArray([0, 1], dims="direction", attrs={"flag_meanings": "up down"})
-    draw_simulated(data.expand_dims(direction=[0, 1]).assign_coords(direction=flags), "vertical", ax)
+    draw_simulated(both_ways(data), "vertical", ax)
     up, down = ax.lines
     assert (up.get_marker(), down.get_marker()) == ("^", "v")
     assert up.get_markersize() > down.get_markersize() > 3.0  # pt; lines of branches are 1.2 wide
     assert to_rgba(up.get_color())[0] - to_rgba(down.get_color())[0] > 0.5  # greys
 
 
-def test_points_are_read_lazily(synthetic_path):
-    store = select(open_store(synthetic_path), CHOICE)
+def test_points_are_read_lazily(store):
     assert sections_along(store, "vertical", "speed_ratio")["section_vertical"].chunks is not None
 
 
-def test_signal_without_section_is_taken_from_its_waveform(synthetic_path):
-    store = select(open_store(synthetic_path), CHOICE)
+def test_signal_without_section_is_taken_from_its_waveform(store):
     found = sections_along(store, "contact_force", "speed_ratio")["section_contact_force"]
     assert found.shape == (5, POINTS)
 
@@ -160,8 +160,7 @@ def test_an_axis_of_even_ratios_is_drawn_on_a_log_scale(synthetic_path, ax):
     assert ax.get_xscale() == "log"
 
 
-def test_points_that_differ_by_rounding_do_not_fill_the_axes(synthetic_path, ax):
-    data = sections_along(select(open_store(synthetic_path), CHOICE), "vertical", "speed_ratio").load()
+def test_points_that_differ_by_rounding_do_not_fill_the_axes(data, ax):
     data["section_vertical"][...] = 1e-4 * (1 + 1e-9 * np.random.default_rng(1).random((5, POINTS)))
     draw_bifurcation(data, "vertical", ax)
     assert np.ptp(ax.get_ylim()) == pytest.approx(2.0)  # um, of 100

@@ -13,7 +13,6 @@ import xarray as xr
 from postproc.figures.cascade import cascade as cascade_figure
 from postproc.figures.cascade import default_limit, intensity, waterfall
 from postproc.figures.cascade_lines import draw_frequencies, draw_orders
-from postproc.figures.drawing import house_style, new_figure
 from postproc.signals.cascade import below, cascade, hold_peaks, hold_rows
 from postproc.store.rig_of_case import natural_frequencies, stator_places
 from postproc.store.select import select
@@ -33,12 +32,6 @@ def cases():
 @pytest.fixture
 def spectra(cases):
     return cascade(cases)
-
-
-@pytest.fixture
-def ax():
-    with house_style():
-        yield new_figure()[1][0]
 
 
 def made(amplitude, speeds, spacing=0.25):

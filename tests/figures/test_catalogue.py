@@ -6,7 +6,6 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 import synthetic_store
@@ -14,9 +13,6 @@ from click.testing import CliRunner
 
 from postproc.catalogue import figures
 from rubhpc.cli import commands
-
-if TYPE_CHECKING:
-    import click
 
 ROOT = Path(__file__).parents[2]
 TOY = '''"""A figure of one bar."""
@@ -75,7 +71,7 @@ def toy(
 
 
 @pytest.fixture
-def toy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def toy(tmp_path, monkeypatch):
     """A folder with one more figure, where the others are looked for too."""
     import postproc.figures
 
@@ -92,7 +88,7 @@ def invoke(*args: str) -> str:
 
 
 @pytest.mark.usefixtures("toy")
-def test_a_file_with_a_function_of_its_name_is_a_command() -> None:
+def test_a_file_with_a_function_of_its_name_is_a_command():
     assert "\n  toy          Bars of the largest measure." in invoke("--help")
     shown = " ".join(invoke("toy", "--help").split())
     for text in (
@@ -109,7 +105,7 @@ def test_a_file_with_a_function_of_its_name_is_a_command() -> None:
 
 
 @pytest.mark.usefixtures("toy")
-def test_its_lines_are_printed_and_its_figure_is_saved(tmp_path: Path) -> None:
+def test_its_lines_are_printed_and_its_figure_is_saved(tmp_path):
     synthetic_store.write(tmp_path / "study.zarr", synthetic_store.make())
     printed = invoke("toy", "study.zarr", "--bars", "2", "--side", "right", "--mark", "a=3 Hz").splitlines()
     assert printed[0].endswith(", 2 bars on the right, {'a': '3 Hz'}")
@@ -117,7 +113,7 @@ def test_its_lines_are_printed_and_its_figure_is_saved(tmp_path: Path) -> None:
     assert Path("study_toy.png").exists()
 
 
-def test_it_is_a_method_of_a_store(toy: Path) -> None:
+def test_it_is_a_method_of_a_store(toy):
     synthetic_store.write(Path("study.zarr"), synthetic_store.make())
     script = (
         f"import matplotlib, postproc.figures; postproc.figures.__path__.append({str(toy)!r})\n"
@@ -131,38 +127,8 @@ def test_it_is_a_method_of_a_store(toy: Path) -> None:
     subprocess.run([sys.executable, "-c", script], env=environment, check=True, timeout=120)
 
 
-def test_files_that_figures_share_are_no_figures() -> None:
-    assert {"cascade", "map", "orbit", "sensitivity"} <= set(figures())
-    assert not {"drawing", "style", "palette", "campbell", "options"} & set(figures())
-
-
-def test_every_option_has_its_help_and_every_figure_its_summary() -> None:
+def test_every_option_has_its_help_and_every_figure_its_summary():
     for figure in figures().values():
         assert figure.summary.endswith(".")
         assert len(figure.summary) < 70
         assert all(option.help for option in figure.options.values()), figure.name
-
-
-def options_of(command: click.Command | None) -> dict[str, object]:
-    assert command is not None
-    return {option.name: option.default for option in command.params if option.name is not None}
-
-
-def test_some_declarations_become_the_options_that_users_know() -> None:
-    import click
-
-    context = click.Context(commands)
-    cascade = commands.get_command(context, "cascade")
-    assert list(options_of(cascade)) == [
-        *("store", "selection", "output", "data", "measured"),
-        *("signal", "full", "probes", "node", "stator", "along", "form", "max", "orders", "order_lines"),
-        "mark",
-    ]
-    assert options_of(cascade)["order_lines"].startswith("1/3,1/2")
-    hht = commands.get_command(context, "hht")
-    assert hht is not None
-    kinds = {option.name: option.type for option in hht.params}
-    assert isinstance(kinds["contact"], click.Choice)
-    mode = kinds["mode"]
-    assert isinstance(mode, click.IntRange)
-    assert (mode.min, mode.max) == (1, 8)

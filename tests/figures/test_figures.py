@@ -10,7 +10,7 @@ from matplotlib.markers import TICKDOWN, TICKRIGHT
 from postproc.cases.maps import default_axes, map_data
 from postproc.figures.cells import cell_edges, hatch_cells, outline_cells
 from postproc.figures.drawing import check_figure_path, house_style, new_figure, save
-from postproc.figures.map import value_maps
+from postproc.figures.map import draw_maps
 from postproc.figures.orbit import draw_orbit, orbit
 from postproc.figures.section import draw_section
 from postproc.figures.small_multiples import overlaid
@@ -40,12 +40,6 @@ def store():
 @pytest.fixture(scope="module")
 def case(store):
     return select(store, ONE)
-
-
-@pytest.fixture
-def ax():
-    with house_style():
-        yield new_figure()[1][0]
 
 
 @pytest.fixture
@@ -96,7 +90,7 @@ def test_no_map_of_what_is_no_scalar(plain_map):
 
 
 def test_a_map_is_drawn_with_units_hatching_and_ticks(plain_map, ax):
-    assert value_maps(plain_map("peak_contact_force"), "peak_contact_force", [ax]) == [ax]
+    assert draw_maps(plain_map("peak_contact_force"), "peak_contact_force", [ax]) == [ax]
     assert ax.get_xlabel() == "Speed ratio $r$"
     assert ax.get_ylabel() == "Clearance (µm)"
     assert ax.figure.axes[1].get_ylabel() == "Peak contact force (N)"
@@ -114,7 +108,7 @@ def test_a_map_is_drawn_with_units_hatching_and_ticks(plain_map, ax):
 
 
 def test_regimes_have_colours_of_their_own(plain_map, ax):
-    value_maps(plain_map("regime"), "regime", [ax])
+    draw_maps(plain_map("regime"), "regime", [ax])
     assert bar_names(ax) == ["no contact", "periodic", "quasi-periodic", "chaotic"]
     mesh = ax.collections[0]
     colors = mesh.to_rgba(mesh.get_array()).reshape(3, 5, 4)  # (clearance, speed)
@@ -132,7 +126,7 @@ def test_regimes_have_colours_of_their_own(plain_map, ax):
     ],
 )
 def test_flags_are_named(plain_map, ax, value, names):
-    value_maps(plain_map(value), value, [ax])
+    draw_maps(plain_map(value), value, [ax])
     assert bar_names(ax) == names
     assert bool(ax.figure.legends) == (value != "status")
 
@@ -140,24 +134,24 @@ def test_flags_are_named(plain_map, ax, value, names):
 def test_a_map_of_settings_needs_no_result(store, ax):
     chosen = select(store, {"friction": 0.1, "stator_youngs_modulus": 3e9})
     data = map_data(chosen, "spin_speed", ["speed_ratio", "clearance"])
-    value_maps(data, "spin_speed", [ax])
+    draw_maps(data, "spin_speed", [ax])
     assert np.ma.count_masked(ax.collections[0].get_array()) == 0
 
 
 def test_a_finished_case_may_have_no_value(plain_map, ax):
     data = plain_map("contact_duration")
     data["contact_duration"][1, 2] = np.nan  # it never touched
-    value_maps(data, "contact_duration", [ax])
+    draw_maps(data, "contact_duration", [ax])
     labels = [text.get_text() for text in ax.figure.legends[0].get_texts()]
     assert "no value" in labels
 
 
 def test_a_logarithmic_map_needs_positive_values(plain_map, ax):
-    value_maps(plain_map("peak_contact_force"), "peak_contact_force", [ax], log=True)
+    draw_maps(plain_map("peak_contact_force"), "peak_contact_force", [ax], log=True)
     data = plain_map("peak_contact_force")
     data["peak_contact_force"] = 0 * data["peak_contact_force"]
     with pytest.raises(InputError, match="nowhere positive"):
-        value_maps(data, "peak_contact_force", [ax], log=True)
+        draw_maps(data, "peak_contact_force", [ax], log=True)
 
 
 def test_cells_meet_half_way_also_on_a_log_scale():
@@ -401,7 +395,7 @@ def test_what_had_not_settled_is_hatched(store, ax):
     settled = xr.where(store["status"] == DONE, 1, -1).astype("int8")
     settled[{"speed_ratio": 2}] = 0
     chosen = select(store.assign(settled=settled), {"friction": 0.1, "stator_youngs_modulus": 3e9})
-    value_maps(map_data(chosen, "peak_torsion", ["speed_ratio", "clearance"]), "peak_torsion", [ax])
+    draw_maps(map_data(chosen, "peak_torsion", ["speed_ratio", "clearance"]), "peak_torsion", [ax])
     patch = next(p for p in ax.patches if p.get_label() == "not settled")
     corners = patch.get_path().vertices
     assert (corners[:, 0].min(), corners[:, 0].max()) == pytest.approx((1.125, 1.375))
@@ -411,7 +405,7 @@ def test_a_line_surrounds_what_is_out_of_range_where_that_is_most(plain_map, ax)
     """Hatched all over, a map shows neither its colours nor where the model holds."""
     shown = plain_map("peak_contact_force")
     shown["validity"] = shown["validity"].where(shown["validity"] > 0, 4)
-    value_maps(shown, "peak_contact_force", [ax])
+    draw_maps(shown, "peak_contact_force", [ax])
     labels = [text.get_text().replace("\n", " ") for text in ax.figure.legends[0].get_texts()]
     n = int((shown["status"] == 1).sum())
     assert labels[-1].startswith(f"out of range in all {n} cases: slip (6), Euler load (3), foreshortening (")

@@ -1,7 +1,5 @@
 """The resilience curve: what no knock leads to is marked as such, and directions are signed."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

@@ -1,7 +1,5 @@
 """Names beside a scale of colours, and the legend below: they fit."""
 
-from __future__ import annotations
-
 from matplotlib.figure import Figure
 
 from postproc.figures.small_multiples import color_names, legend_below

@@ -77,7 +77,7 @@ def test_interpolated_cases_are_the_cases():
 def test_a_case_that_fails_is_not_interpolated(monkeypatch):
     trial = trials(1, [0.01])[0]
     problem = read_problem(calibration._measured(trial, read_known(STUDY))[1], STUDY)
-    monkeypatch.setattr(type(problem.rub), "outcome", lambda self, values: 1 / 0)
+    monkeypatch.setattr(type(problem.machine), "simulate", lambda self, values: 1 / 0)
     assert not Interpolated(problem.rub).serves(problem.comparison.measured)
 
 

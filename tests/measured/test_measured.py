@@ -1,7 +1,5 @@
 """Measured files: every format, order tracking, and what a record says of its own faults."""
 
-from pathlib import Path
-
 import data_logger
 import numpy as np
 import pytest
@@ -23,7 +21,7 @@ def read(path, **keys):
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch) -> Path:
+def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

@@ -61,15 +61,12 @@ def run(files, monkeypatch):
     ("name", "args"),
     [
         ("waveform", ["probe.csv"]),
-        ("orbit", ["probe.csv", "--revolutions", 4]),
         ("spectrum", ["probe.toml", "--full", "--orders"]),
-        ("hht", ["probe.toml", "--mode", 2]),
         ("orbit", ["rigged.toml", "--node", 8]),
         ("hht", ["rigged.toml", "--mode", 2]),
         ("cascade", ["both.toml"]),
         ("bode", ["both.toml", "--signal", "vertical", "--signal", "horizontal"]),
         ("waveform", ["up.toml", "--at", "1500 rpm"]),
-        ("orbit", ["up.toml", "--at", "1500 rpm"]),
         ("spectrum", ["up.toml", "--at", "1500 rpm"]),
         ("waterfall", ["up.toml", "--full"]),
         ("bode", ["up.toml"]),
@@ -113,20 +110,10 @@ def test_a_figure_shows_one_case_and_a_record_over_one_another(run):
 
 def test_figures_that_cannot_share_their_axes_are_next_to_one_another(run):
     chosen = [w for pair in zip(["--select"] * 3, CASE[1:], strict=True) for w in pair]
-    said = run("cascade", "study.zarr", *chosen, "--signal", "vertical", "--measured", "both.toml").output
-    assert said.splitlines()[-1] == "study_cascade.png"
+    args = ["study.zarr", *chosen, "--signal", "vertical", "--measured", "both.toml"]
+    assert run("cascade", *args).output.splitlines()[-1] == "study_cascade.png"
     with pytest.raises(InputError, match="leave out --data"):
-        run(
-            "cascade",
-            "study.zarr",
-            *chosen,
-            "--signal",
-            "vertical",
-            "--measured",
-            "both.toml",
-            "--data",
-            "s.nc",
-        )
+        run("cascade", *args, "--data", "s.nc")
 
 
 @pytest.mark.parametrize(

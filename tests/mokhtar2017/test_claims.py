@@ -1,7 +1,5 @@
 """The claims on stores of known content: each holds on what it describes, and fails on what it does not."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

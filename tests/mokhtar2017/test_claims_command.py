@@ -1,7 +1,5 @@
 """`rubhpc claims` as a user meets it: on stores that simulations have just made, and on stores that lack."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
@@ -27,7 +25,7 @@ NOT_OF_THEM = {"C60", "C61"}  # take stiffer stators
 
 
 @pytest.fixture(scope="module")
-def simulated(tmp_path_factory) -> Path:
+def simulated(tmp_path_factory):
     """Folder of two studies of the paper, simulated again over fewer revolutions."""
     folder = tmp_path_factory.mktemp("paper")
     for name, values in SIMULATED.items():

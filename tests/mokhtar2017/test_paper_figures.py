@@ -1,7 +1,5 @@
 """The paper's figures, drawn from the synthetic stores: their panels, their curves, and what they mark."""
 
-from __future__ import annotations
-
 import pytest
 from synthetic_paper import SAMPLES
 

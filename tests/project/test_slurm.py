@@ -94,43 +94,28 @@ def test_only_a_study_stopped_early_is_queued_again(code: int, slurm: dict[str, 
     assert requeued(tmp_path) == (["requeue 4711"] if code == 75 else [])
 
 
-@pytest.mark.parametrize("launcher", ["srun", "mpirun -quiet"])
-def test_usr1_reaches_the_step_and_its_end_is_waited_for(
-    launcher: str, slurm: dict[str, str], tmp_path: Path
+@pytest.mark.parametrize("sent", [signal.SIGUSR1, signal.SIGTERM], ids=["stopped", "cancelled"])
+@pytest.mark.parametrize("launcher", ["srun", "mpirun -quiet", "rubhpc"])
+def test_a_signal_reaches_the_step_whose_end_is_waited_for(
+    launcher: str, sent: signal.Signals, slurm: dict[str, str], tmp_path: Path
 ) -> None:
-    job = start(["study.toml"], slurm | {"RUBHPC_LAUNCHER": launcher}, tmp_path)
+    """A sweep, or a part of a study, is queued again unless it was cancelled."""
+    arguments, script, given = ["my study.toml", "--quiet"], SWEEP, {"RUBHPC_LAUNCHER": launcher}
+    if launcher == "rubhpc":
+        (tmp_path / "bin" / "rubhpc").write_text(SRUN)
+        (tmp_path / "bin" / "rubhpc").chmod(0o755)
+        arguments, script = ["64", *arguments], SCRIPTS.parent / "cluster" / "parts.sh"
+        given = {"SLURM_ARRAY_TASK_ID": "3"}
+    job = start(arguments, slurm | given, tmp_path, script)
     wait_for(tmp_path / "step.running")
-    job.send_signal(signal.SIGUSR1)
+    job.send_signal(sent)
     job.communicate(timeout=60)
-    assert (tmp_path / "step.signals").read_text() == "USR1\n"
+    if launcher == "rubhpc":
+        assert (tmp_path / "step.arguments").read_text() == "my study.toml --quiet --part 3/64\n"
+    else:
+        assert (tmp_path / "step.signals").read_text() == f"{sent.name[3:]}\n"
     assert job.returncode == 75
-    assert requeued(tmp_path) == ["requeue 4711"]
-
-
-def test_cancelled_job_stays_cancelled(slurm: dict[str, str], tmp_path: Path) -> None:
-    job = start(["study.toml"], slurm, tmp_path)
-    wait_for(tmp_path / "step.running")
-    job.send_signal(signal.SIGTERM)
-    job.communicate(timeout=60)
-    assert (tmp_path / "step.signals").read_text() == "TERM\n"
-    assert job.returncode == 75
-    assert requeued(tmp_path) == []
-
-
-@pytest.mark.parametrize(("signal_", "again"), [(signal.SIGUSR1, ["requeue 4711"]), (signal.SIGTERM, [])])
-def test_a_part_that_stops_early_is_queued_again_unless_it_was_cancelled(
-    signal_: signal.Signals, again: list[str], slurm: dict[str, str], tmp_path: Path
-) -> None:
-    (tmp_path / "bin" / "rubhpc").write_text(SRUN)
-    (tmp_path / "bin" / "rubhpc").chmod(0o755)
-    script = SCRIPTS.parent / "cluster" / "parts.sh"
-    job = start(["64", "my study.toml", "--quiet"], slurm | {"SLURM_ARRAY_TASK_ID": "3"}, tmp_path, script)
-    wait_for(tmp_path / "step.running")
-    job.send_signal(signal_)
-    job.communicate(timeout=60)
-    assert (tmp_path / "step.arguments").read_text() == "my study.toml --quiet --part 3/64\n"
-    assert job.returncode == 75
-    assert requeued(tmp_path) == again
+    assert requeued(tmp_path) == (["requeue 4711"] if sent is signal.SIGUSR1 else [])
 
 
 def test_requeueing_has_an_end(slurm: dict[str, str], tmp_path: Path) -> None:

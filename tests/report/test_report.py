@@ -8,7 +8,6 @@ import json
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -30,10 +29,6 @@ from rubhpc.errors import InputError
 from rubhpc.rig.reading import read_rig
 from rubhpc.rig.rig import Rig
 from rubhpc.rig.stators import Bore
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
 
 MB = 1e6
 
@@ -63,13 +58,13 @@ class Elements(HTMLParser):
 
 
 @pytest.fixture(scope="module")
-def written(two_stator_path: Path) -> Elements:
+def written(two_stator_path):
     path = two_stator_path.with_suffix(".html")
     write_report(open_store(two_stator_path), path, 20 * MB)
     return Elements(path.read_text())
 
 
-def test_all_that_is_shown_of_a_quantity_has_one_unit(two_stator_path: Path) -> None:
+def test_all_that_is_shown_of_a_quantity_has_one_unit(two_stator_path):
     facts = json.loads(Elements(Page(open_store(two_stator_path)).html(values={})).scripts["facts"])
     assert {n: s["unit"] for n, s in facts["signals"].items()} == {
         "vertical": "µm",
@@ -87,7 +82,7 @@ def test_all_that_is_shown_of_a_quantity_has_one_unit(two_stator_path: Path) -> 
     assert stronger.measures.scale("torsion").unit == "mrad"
 
 
-def test_the_page_needs_nothing_else(written: Elements) -> None:
+def test_the_page_needs_nothing_else(written):
     kinds = {tag for tag, _ in written.found}
     assert not {"iframe", "object", "audio"} & kinds  # pictures are data, as links below
     links = [
@@ -96,7 +91,7 @@ def test_the_page_needs_nothing_else(written: Elements) -> None:
     assert all(link.startswith(("#", "data:")) for link in links if link)
 
 
-def test_the_page_carries_every_case_that_is_done(written: Elements) -> None:
+def test_the_page_carries_every_case_that_is_done(written):
     records = json.loads(written.scripts["records"])
     status = synthetic_store.make()["status"].values.ravel()
     assert sorted(map(int, records)) == np.flatnonzero(status == 1).tolist()
@@ -108,7 +103,7 @@ def test_the_page_carries_every_case_that_is_done(written: Elements) -> None:
     assert facts["nStator"] == 2
 
 
-def test_every_control_and_drawing_has_a_name(written: Elements) -> None:
+def test_every_control_and_drawing_has_a_name(written):
     by_role = [(tag, a) for tag, a in written.found if a.get("role") in ("img", "application")]
     assert len(by_role) >= 6
     assert all(a.get("aria-label") or a.get("aria-labelledby") for _, a in by_role)
@@ -123,7 +118,7 @@ def test_every_control_and_drawing_has_a_name(written: Elements) -> None:
     assert named <= set(ids)
 
 
-def test_failures_are_reported_with_their_reasons(two_stator_path: Path) -> None:
+def test_failures_are_reported_with_their_reasons(two_stator_path):
     dataset = open_store(two_stator_path).assign_attrs(reasons={0: "ran away <b>", 12: "worker died"})
     text = Page(dataset).html(values={})
     assert "1 case diverged" in text
@@ -133,7 +128,7 @@ def test_failures_are_reported_with_their_reasons(two_stator_path: Path) -> None
     assert "speed ratio 1, clearance 70 µm, friction coefficient 0.1, stator modulus 3 GPa" in text
 
 
-def test_validity_counts_what_is_out_of_range(two_stator_path: Path) -> None:
+def test_validity_counts_what_is_out_of_range(two_stator_path):
     text = Page(open_store(two_stator_path)).html(values={})
     rows = re.findall(r'scope="row">([^<]+)</th><td>[^<]+</td>\D*?data-label="Cases">(\d+)<', text)
     reported = {name: int(n) for name, n in rows}
@@ -143,9 +138,10 @@ def test_validity_counts_what_is_out_of_range(two_stator_path: Path) -> None:
     assert reported["Tip deflection over length"] == 0
 
 
-def test_slip_may_reverse_under_coulombs_law(two_stator_path: Path) -> None:
+@pytest.mark.parametrize("law", ["coulomb", "stribeck", "table"])
+def test_slip_may_reverse_without_steady_sliding(two_stator_path, law):
     dataset = open_store(two_stator_path)
-    study = {**table_of(dataset, "study"), "contact": {"friction_law": "coulomb"}}
+    study = {**table_of(dataset, "study"), "contact": {"friction_law": law}}
     text = Page(dataset.assign_attrs(study=study)).html(values={})
     assert "Contact force over Euler load" in text
     assert "contradicts steady sliding" not in text
@@ -158,9 +154,7 @@ def test_slip_may_reverse_under_coulombs_law(two_stator_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("room", "is_cut"), [(20_000, True), (300_000, False)])
-def test_the_size_is_kept_and_what_is_left_out_is_said(
-    two_stator_path: Path, tmp_path: Path, room: int, is_cut: bool
-) -> None:
+def test_the_size_is_kept_and_what_is_left_out_is_said(two_stator_path, tmp_path, room, is_cut):
     path = tmp_path / "small.html"
     limit = least_size(Page(open_store(two_stator_path))) + room
     load = write_report(open_store(two_stator_path), path, limit)
@@ -173,9 +167,7 @@ def test_the_size_is_kept_and_what_is_left_out_is_said(
     assert all(note in html.unescape(text) for note in load.notes)
 
 
-def test_predicting_the_size_reads_no_case_but_the_pilots(
-    two_stator_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_predicting_the_size_reads_no_case_but_the_pilots(two_stator_path, tmp_path, monkeypatch):
     """What lies around the pilots of 100 000 cases took longer to read than all that is on the page."""
     alone: list[int] = []
     record = Cases.record
@@ -188,14 +180,14 @@ def test_predicting_the_size_reads_no_case_but_the_pilots(
     assert len(load.records) > 48
 
 
-def test_a_limit_that_nothing_fits_is_refused(two_stator_path: Path, tmp_path: Path) -> None:
+def test_a_limit_that_nothing_fits_is_refused(two_stator_path, tmp_path):
     with pytest.raises(InputError, match=r"--limit: 0\.1 MB is too small for this store; give 0\.\d MB"):
         write_report(open_store(two_stator_path), tmp_path / "none.html", 0.1 * MB)
     assert not (tmp_path / "none.html").exists()
 
 
 @pytest.mark.parametrize("keep", [(), ("spectrum",), ("section",), ("waveform",)])
-def test_a_store_that_keeps_less_has_a_page_too(tmp_path: Path, keep: tuple[str, ...]) -> None:
+def test_a_store_that_keeps_less_has_a_page_too(tmp_path, keep):
     synthetic_store.write(tmp_path / "less.zarr", synthetic_store.make(keep=keep))
     load = write_report(open_store(tmp_path / "less.zarr"), tmp_path / "less.html", 20 * MB)
     if not keep:
@@ -212,7 +204,7 @@ def test_a_store_that_keeps_less_has_a_page_too(tmp_path: Path, keep: tuple[str,
     )
 
 
-def test_an_unsorted_axis_has_its_cells_in_order() -> None:
+def test_an_unsorted_axis_has_its_cells_in_order():
     dataset = synthetic_store.make(keep=()).isel(clearance=[2, 0, 1])
     axis = described_axes(dataset)[1]
     assert axis["values"] == pytest.approx([100, 70, 84])
@@ -229,7 +221,7 @@ RINGS = {
 
 
 @pytest.mark.parametrize("kind", RINGS)
-def test_every_kind_of_stator_is_drawn(kind: str) -> None:
+def test_every_kind_of_stator_is_drawn(kind):
     from postproc.report.rig_views import end_view, side_view
     from rubhpc.rig.stators import LumpedStator
 
@@ -246,7 +238,7 @@ def test_every_kind_of_stator_is_drawn(kind: str) -> None:
 
 
 @pytest.mark.parametrize(("count", "kind"), [(8, "circle"), (1, "path")])
-def test_a_carrier_is_drawn_on_its_springs(count: int, kind: str) -> None:
+def test_a_carrier_is_drawn_on_its_springs(count, kind):
     """In place of the walls behind its stators; around the shaft where they are."""
     from postproc.report.rig_views import end_view, side_view
     from rubhpc.rig.carriers import Carrier
@@ -263,7 +255,7 @@ def test_a_carrier_is_drawn_on_its_springs(count: int, kind: str) -> None:
     assert side_view(rig).count('class="spring"') == (2 if count == 8 else 1)
 
 
-def test_a_rotor_of_matrices_is_reported_in_words() -> None:
+def test_a_rotor_of_matrices_is_reported_in_words():
     from postproc.report.rig_views import description, end_view, side_view
     from rubhpc.rig.stators import LumpedStator
 
@@ -274,9 +266,7 @@ def test_a_rotor_of_matrices_is_reported_in_words() -> None:
     assert description(rig) == "rotor of 1 degree of freedom, by its matrices; 1 stator"
 
 
-def test_the_command_writes_the_page_and_says_what_is_on_it(
-    two_stator_path: Path, tmp_path: Path, monkeypatch
-) -> None:
+def test_the_command_writes_the_page_and_says_what_is_on_it(two_stator_path, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     said = printed(report, two_stator_path, "--limit", "3 MB")
     assert said.startswith("study.html (")
@@ -293,9 +283,7 @@ def test_the_command_writes_the_page_and_says_what_is_on_it(
         (["--limit", "much"], "--limit"),
     ],
 )
-def test_wrong_input_is_one_line(
-    two_stator_path: Path, tmp_path: Path, monkeypatch, args: list[str], message: str
-) -> None:
+def test_wrong_input_is_one_line(two_stator_path, tmp_path, monkeypatch, args, message):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InputError) as refusal:
         printed(report, two_stator_path, *args)
@@ -303,7 +291,7 @@ def test_wrong_input_is_one_line(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_page_has_the_critical_speeds_of_the_rotor(synthetic_path: Path) -> None:
+def test_the_page_has_the_critical_speeds_of_the_rotor(synthetic_path):
     store = open_store(synthetic_path)
     text = Page(store).html(values={})
     assert "Without contact, the rotor is stable" in text
@@ -314,14 +302,14 @@ def test_the_page_has_the_critical_speeds_of_the_rotor(synthetic_path: Path) -> 
     assert "There is no linear design of this rig" in Page(bare).html(values={})
 
 
-def test_measures_say_which_stator_is_the_worst(two_stator_path: Path) -> None:
+def test_measures_say_which_stator_is_the_worst(two_stator_path):
     facts = json.loads(Elements(Page(open_store(two_stator_path)).html()).scripts["facts"])
     worst = {v["name"]: v["worst"] for v in facts["variables"] if v["by_stator"]}
     assert worst["peak_contact_force"] == "largest"
     assert worst["minimum_slip_speed"] == "smallest"
 
 
-def test_masses_have_no_euler_load() -> None:
+def test_masses_have_no_euler_load():
     beams = synthetic_store.make(n_stator=2)
     mass = {"node": 8, "radius": 0.06, "mass": 1e-3, "stiffness": 1e6, "lateral_stiffness": 1e5}
     masses = beams.assign_attrs(rig=beams.attrs["rig"] | {"stator": [mass, mass | {"angle": 1.0}]})
@@ -337,7 +325,7 @@ def test_masses_have_no_euler_load() -> None:
     assert of_keys & set(Measures(strong).names) == {"force_over_strength"}
 
 
-def test_the_page_says_what_can_whirl_in_a_bore(synthetic_path: Path) -> None:
+def test_the_page_says_what_can_whirl_in_a_bore(synthetic_path):
     store = open_store(synthetic_path)
     assert not whirl_facts(store)["sentences"], "no bore"
     bored = store.copy()

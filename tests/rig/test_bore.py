@@ -67,7 +67,7 @@ def test_a_kind_is_optional_elsewhere_and_leaves_no_trace():
         ({"law": {"stiffness": 1e5}}, r"law\] stiffness: a multiplier has none"),
         (
             {"law": {"kind": "penalty", "stiffness": 1e5, "restitution": 0.5}},
-            r"restitution: a penalty's",
+            r"restitution: the rebound of a spring",
         ),
         (
             {"law": {"kind": "penalty", "stiffness": "1e5 N/m^1.5"}},

@@ -64,11 +64,6 @@ def test_inertia_of_a_disc_is_the_integral_over_its_points():
     assert disc.inertia == pytest.approx(found, rel=2e-4)
 
 
-def test_a_lumped_disc_keeps_what_it_is_given():
-    disc = Disc(node=1, mass=2.0, diametral_inertia=3.0, polar_inertia=4.0, diameter=0.2)
-    assert disc.inertia == (2.0, 3.0, 4.0)
-
-
 def test_bearing_matrices():
     common = Bearing(node=1, stiffness=5.0, damping=7.0)
     assert common.stiffness_matrix == ((5.0, 0.0), (0.0, 5.0))
@@ -168,8 +163,3 @@ def test_a_rig_survives_json(rig):
     assert again.stator[0].damping == Damping(ratios=((1 / 3, 0.1), (803.0, 0.05)))
     assert again.rotor == changed.rotor
     assert rig_from_dict(json.loads(json.dumps(again.as_dict()))) == again
-
-
-def test_a_rig_file_of_ones_own(tmp_path, rig):
-    (tmp_path / "own.toml").write_text((read_rig.__globals__["PACKAGED"] / "mokhtar2017.toml").read_text())
-    assert read_rig("own.toml", tmp_path) == read_rig(tmp_path / "own.toml") == rig

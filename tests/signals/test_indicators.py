@@ -325,8 +325,3 @@ def test_the_command_reads_no_waveform_of_a_store_without_contact(tmp_path, monk
     store({}, np.arange(100) < 3).to_zarr(tmp_path / "free.zarr", zarr_format=3, consolidated=False)
     with pytest.raises(InputError, match="97 selected cases without contact and 3 with it are too few"):
         printed("indicators", tmp_path / "free.zarr")
-
-
-def test_the_command_refuses_bad_levels(written):
-    with pytest.raises(InputError, match="levels above 0"):
-        printed("indicators", written, "--noise", "-1")

@@ -1,9 +1,5 @@
 """Stores of sweeps both ways: the directions by name, apart in figures, on the page."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -20,14 +16,9 @@ from postproc.store.units import caption, written_value
 from rubhpc.cli import commands
 from rubhpc.errors import InputError
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import xarray as xr
-
 
 @pytest.fixture(scope="module")
-def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def path(tmp_path_factory):
     """A study of three speeds up and down at two clearances."""
     folder = tmp_path_factory.mktemp("swept")
     axis = '{ values = [0.9, 1.4, 1.9], sweep = "both" }'
@@ -37,7 +28,7 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def store(path: Path) -> xr.Dataset:
+def store(path):
     return rubhpc.open(path)
 
 

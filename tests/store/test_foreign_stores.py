@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 @pytest.fixture
-def store(synthetic_path: Path, tmp_path: Path) -> Path:
+def store(synthetic_path, tmp_path):
     return shutil.copytree(synthetic_path, tmp_path / "foreign.zarr")
 
 
@@ -50,7 +50,7 @@ class Touch:
         return os.mkdir, (str(self.path),)
 
 
-def test_pickles_of_format_2_are_not_there(tmp_path: Path) -> None:
+def test_pickles_of_format_2_are_not_there(tmp_path):
     store, trace = tmp_path / "old.zarr", tmp_path / "trace"
     array = {"zarr_format": 2, "shape": [2], "chunks": [2], "dtype": "|O", "compressor": None, "order": "C"}
     array |= {"fill_value": None, "filters": [{"id": "pickle", "protocol": 4}]}
@@ -87,7 +87,7 @@ CODEC = {"name": "bytes", "configuration": {"endian": "little"}}
         ("status", "dimension_names", ["\x1b[31m"] * 4, "not named"),
     ],
 )
-def test_what_no_store_holds_is_refused(store: Path, name: str, key: str, value: Any, says: str) -> None:
+def test_what_no_store_holds_is_refused(store, name, key, value, says):
     change(store, name, lambda metadata: metadata.update({key: value}))
     with pytest.raises(StoreError) as refusal:
         open_store(store)
@@ -95,7 +95,7 @@ def test_what_no_store_holds_is_refused(store: Path, name: str, key: str, value:
     assert str(refusal.value).isprintable()
 
 
-def test_a_coordinate_of_which_nothing_is_there_is_refused(store: Path) -> None:
+def test_a_coordinate_of_which_nothing_is_there_is_refused(store):
     def edit(metadata: dict[str, Any]) -> None:
         metadata["shape"] = metadata["chunk_grid"]["configuration"]["chunk_shape"] = [10**7]
 
@@ -104,7 +104,7 @@ def test_a_coordinate_of_which_nothing_is_there_is_refused(store: Path) -> None:
         open_store(store)
 
 
-def test_a_chunk_that_decodes_into_more_than_it_should_is_not_decoded(store: Path) -> None:
+def test_a_chunk_that_decodes_into_more_than_it_should_is_not_decoded(store):
     def edit(metadata: dict[str, Any]) -> None:
         metadata["codecs"] = [CODEC, {"name": "zstd", "configuration": {"level": 0, "checksum": False}}]
 
@@ -114,7 +114,7 @@ def test_a_chunk_that_decodes_into_more_than_it_should_is_not_decoded(store: Pat
         open_store(store)
 
 
-def test_a_file_without_end_is_not_read(store: Path) -> None:
+def test_a_file_without_end_is_not_read(store):
     with (store / "friction" / "c" / "0").open("r+b") as file:
         file.truncate(2**40)  # takes no place
     with pytest.raises(StoreError, match="longer than a chunk can be"):
@@ -135,19 +135,19 @@ def test_a_file_without_end_is_not_read(store: Path) -> None:
         {"title": 1},
     ],
 )
-def test_attributes_of_other_types_are_refused(store: Path, attributes: dict[str, Any]) -> None:
+def test_attributes_of_other_types_are_refused(store, attributes):
     change(store, "", lambda metadata: metadata["attributes"].update(attributes))
     with pytest.raises(StoreError, match="its attributes are not those of a store"):
         open_store(store)
 
 
-def test_a_store_made_with_a_word_of_an_older_version_is_read(store: Path) -> None:
+def test_a_store_made_with_a_word_of_an_older_version_is_read(store):
     study = {"record": {"transient": "shared"}}
     change(store, "", lambda metadata: metadata["attributes"].update(study=study))
     assert json.loads(open_store(store).attrs["study"]) == study
 
 
-def test_control_characters_do_not_reach_the_reader(store: Path) -> None:
+def test_control_characters_do_not_reach_the_reader(store):
     red = "\x1b[31mred\x9b"
     change(store, "", lambda metadata: metadata["attributes"].update(title=red, own={"a": red}))
     change(store, "peak_torsion", lambda metadata: metadata["attributes"].update(long_name=red))
@@ -156,7 +156,7 @@ def test_control_characters_do_not_reach_the_reader(store: Path) -> None:
         assert text.isprintable()
 
 
-def test_a_dataset_is_written_as_netcdf(synthetic_path: Path, tmp_path: Path) -> None:
+def test_a_dataset_is_written_as_netcdf(synthetic_path, tmp_path):
     opened = open_store(synthetic_path)
     opened.to_netcdf(tmp_path / "study.nc")
     with xr.open_dataset(tmp_path / "study.nc") as back:

@@ -1,12 +1,9 @@
 """A store looked at while its run is on, and what it shows of the runs."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -20,18 +17,15 @@ from rubhpc.errors import StoreError
 from rubhpc.schema import DONE
 from rubhpc.storage.runs import read_runs
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
 
 @pytest.fixture
-def store(tmp_path: Path) -> Path:
+def store(tmp_path):
     study = replace(rubhpc.read_study(write_study(tmp_path)), output=tmp_path / "tiny.zarr")
     rubhpc.run(study, quiet=True)
     return study.output
 
 
-def test_measures_come_from_the_journals_before_they_are_packed(store: Path) -> None:
+def test_measures_come_from_the_journals_before_they_are_packed(store):
     packed = open_live(store).load()
     for name in ("status", "peak_torsion", "contact_fraction"):
         chunks = store / name / "c"
@@ -45,7 +39,7 @@ def test_measures_come_from_the_journals_before_they_are_packed(store: Path) -> 
     assert now.encoding["source"] == str(store)
 
 
-def test_what_only_the_journals_know_is_reported(store: Path) -> None:
+def test_what_only_the_journals_know_is_reported(store):
     reported = open_live(store).attrs
     assert reported["reasons"] == {}
     assert reported["running"] == ""
@@ -56,7 +50,7 @@ def test_what_only_the_journals_know_is_reported(store: Path) -> None:
     assert 0 <= run["wrote"] - run["began"] < 120
 
 
-def test_a_run_of_a_copied_store_lasted_as_long(store: Path, tmp_path: Path) -> None:
+def test_a_run_of_a_copied_store_lasted_as_long(store, tmp_path):
     copied = shutil.copytree(store, tmp_path / "copy.zarr")
     for path in copied.rglob("*"):
         os.utime(path, (4e9, 4e9))
@@ -66,12 +60,12 @@ def test_a_run_of_a_copied_store_lasted_as_long(store: Path, tmp_path: Path) -> 
     assert [run.wrote for run in read_runs(copied)] == [4e9]
 
 
-def test_a_second_run_that_computes_nothing_leaves_no_trace(store: Path, tmp_path: Path) -> None:
+def test_a_second_run_that_computes_nothing_leaves_no_trace(store, tmp_path):
     rubhpc.run(tmp_path / "tiny.toml", quiet=True)
     assert [run.number for run in read_runs(store)] == [1]
 
 
-def test_a_damaged_record_of_a_run_is_passed_over(store: Path) -> None:
+def test_a_damaged_record_of_a_run_is_passed_over(store):
     (path,) = (store / ".rubhpc" / "runs").iterdir()
     settings = json.loads(path.read_text())
     path.with_name("run000002.json").write_text("{")
@@ -79,13 +73,13 @@ def test_a_damaged_record_of_a_run_is_passed_over(store: Path) -> None:
     assert [run.number for run in read_runs(store)] == [1]
 
 
-def test_a_store_without_journals_comes_as_it_is(tmp_path: Path) -> None:
+def test_a_store_without_journals_comes_as_it_is(tmp_path):
     synthetic_store.write(tmp_path / "copy.zarr", synthetic_store.make(keep=()))
     now = open_live(tmp_path / "copy.zarr")
     assert "reasons" not in now.attrs
     assert float(now["peak_contact_force"].max()) > 0
 
 
-def test_no_store_is_said(tmp_path: Path) -> None:
+def test_no_store_is_said(tmp_path):
     with pytest.raises(StoreError, match="no such store"):
         open_live(tmp_path / "none.zarr")

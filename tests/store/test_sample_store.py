@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 @pytest.fixture(scope="module")
-def cases(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
+def cases(tmp_path_factory):
     """32 points of speed, stator and disc, at two clearances."""
     folder = tmp_path_factory.mktemp("sample")
     grid = (

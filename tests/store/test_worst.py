@@ -18,7 +18,7 @@ ONE_PLANE = {"friction": 0.1, "stator_youngs_modulus": 3e9}
 
 
 @pytest.fixture(scope="module")
-def ring() -> xr.Dataset:
+def ring():
     """A store in which stator 1 never touches and stator 3 carries the most."""
     store = synthetic_store.make(keep=(), n_stator=N_STATOR)
     share = xr.DataArray([0.0, 0.5, 1.0, 0.25], dims="stator")

@@ -131,13 +131,6 @@ def test_what_the_rig_says_of_a_key_that_is_an_axis_leaves_the_identity(key, uni
     assert CaseGrid(study(SMALL)).identity != identity
 
 
-def test_ids_do_not_depend_on_the_machine():
-    # a store made elsewhere, or by an earlier version with the same physics, is gone on with
-    assert len(CaseGrid(study()).identity) == 64
-    one, other = CaseGrid(study()), CaseGrid(study())
-    assert one.case((0, 0, 0)).id == other.case((0, 0, 0)).id != one.case((0, 0, 1)).id
-
-
 def test_a_case_says_what_the_axes_amount_to():
     grid = SMALL | {"stator.youngs_modulus": [3e9, 3e10], "rotor.bearing.kyy": [1e6, 5e5]}
     case = CaseGrid(study(grid)).case((1, 0, 2, 1, 1))
@@ -238,17 +231,11 @@ def test_a_step_beyond_stability_is_refused_before_the_run():
     CaseGrid(study(SMALL, integrator=Integrator(method="central-difference", step=1e-6)))
 
 
-def test_an_offset_that_closes_a_gap_is_refused_with_the_settings():
-    rig = with_keys(RIG, {"stator.clearance_offset": "-90 um"})  # 0.7 of 122 um is less
-    with pytest.raises(InputError, match=r"\[grid\] clearance_ratio: .* leave no gap"):
-        CaseGrid(study(rig=rig)).operating_points()
-
-
 def test_a_refusal_of_the_settings_names_the_file(tmp_path):
     file = tmp_path / "study.toml"
     with pytest.raises(InputError, match=r"study\.toml: \[integrator\] step: 0\.001 s is above"):
         CaseGrid(study(integrator=Integrator(method="central-difference", step=1e-3), source=file))
-    rig = with_keys(RIG, {"stator.clearance_offset": "-90 um"})
+    rig = with_keys(RIG, {"stator.clearance_offset": "-90 um"})  # 0.7 of 122 um is less
     with pytest.raises(InputError, match=r"study\.toml: \[grid\] clearance_ratio: .* leave no gap"):
         CaseGrid(study(rig=rig, source=file)).operating_points()
 

@@ -7,14 +7,11 @@ from closed_form import LAWS, Contact
 from postproc.cases.maps import validity
 from postproc.store.rig_of_case import rig_of
 from postproc.store.select import select
-from rubhpc import read_rig
 from rubhpc.errors import InputError
 from rubhpc.running.driver import run
 from rubhpc.running.recompute import reproduce
 from rubhpc.storage.store import Store
 from rubhpc.storage.verify import verify
-from rubhpc.study.axes import Axis
-from rubhpc.study.axis_reading import make_axis
 from rubhpc.study.cases import CaseGrid
 from rubhpc.study.study import read_study
 
@@ -117,12 +114,6 @@ def test_order_on_the_axis_changes_no_id(tmp_path):
     assert one.identity == other.identity
     assert one.case((0, 0, 0, 0)).id == other.case((0, 0, 0, 1)).id
     assert one.case((0, 0, 0, 0)).contact.normal == "fixed"
-
-
-def test_an_axis_made_in_python_is_the_file_s():
-    axis = make_axis("contact.law", ["penalty", "lagrange"], read_rig("mokhtar2017"))
-    assert isinstance(axis, Axis)
-    assert (axis.values, axis.words, axis.is_rig_key) == ((1.0, 0.0), ["penalty", "lagrange"], False)
 
 
 def test_a_study_of_laws_runs_is_selected_by_name_and_recomputed(tmp_path):

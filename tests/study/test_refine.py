@@ -24,16 +24,19 @@ friction = [0.1, 0.3]
 SPEEDS = "{ start = 1.0, stop = 2.0, num = 9 }"
 
 
+def results(known, truth, values=None, tolerance=0.1):
+    measured = [] if values is None else [(np.where(known, values, np.nan), tolerance)]
+    nothing = np.zeros(known.shape, bool)
+    return Results(is_known=known, is_failed=nothing, classes=[np.where(known, truth, -1)], values=measured)
+
+
 def refined(truth, levels, values=None, tolerance=0.1, known=None):
     """Run all levels on a known map: the cases that are computed, and how many levels it took."""
     known = np.zeros(levels.shape, bool) if known is None else known.copy()
     n_round = 0
     while True:
         n_round += 1
-        classes = [np.where(known, truth, -1)]
-        measured = [] if values is None else [(np.where(known, values, np.nan), tolerance)]
-        nothing = np.zeros(levels.shape, bool)
-        asked = levels.asked(Results(is_known=known, is_failed=nothing, classes=classes, values=measured))
+        asked = levels.asked(results(known, truth, values, tolerance))
         if asked.is_all:
             return asked.cases, n_round - 1
         known |= asked.cases
@@ -153,13 +156,10 @@ def test_the_order_of_results_changes_nothing(seed):
     known, before, n_round = np.zeros(truth.shape, bool), np.zeros(truth.shape, bool), 0
     edges, fresh = None, np.zeros(0, np.int64)
     while True:
-        results = Results(
-            is_known=known, is_failed=np.zeros(truth.shape, bool), classes=[np.where(known, truth, -1)]
-        )
-        asked = levels.asked(results)
+        asked = levels.asked(results(known, truth))
         assert not (before & ~asked.cases).any()
         if edges is not None:
-            edges.follow(results, fresh)
+            edges.follow(results(known, truth), fresh)
             assert (edges.asked == asked.cases).all()
         edges = asked.edges
         if asked.is_all:
@@ -179,11 +179,7 @@ def test_what_does_not_depend_on_a_missing_case_is_asked_for():
     whole, n_level = refined(truth, levels)
     known, n_round = np.zeros(truth.shape, bool), 0
     while n_round < n_level:
-        asked = levels.asked(
-            Results(
-                is_known=known, is_failed=np.zeros(truth.shape, bool), classes=[np.where(known, truth, -1)]
-            )
-        )
+        asked = levels.asked(results(known, truth))
         known, n_round = asked.cases.copy(), n_round + 1
         known[56, 56] = False
     assert not asked.is_all
@@ -219,8 +215,7 @@ def test_the_estimate_is_that_of_edges_and_ends_at_the_truth():
     levels = Levels(truth.shape, (0, 1), 16)
     known, estimates = np.zeros(truth.shape, bool), []
     while True:
-        nothing = np.zeros(truth.shape, bool)
-        asked = levels.asked(Results(is_known=known, is_failed=nothing, classes=[np.where(known, truth, -1)]))
+        asked = levels.asked(results(known, truth))
         estimates.append(asked.n_expected)
         if asked.is_all:
             break

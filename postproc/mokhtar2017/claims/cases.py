@@ -37,14 +37,8 @@ class Cases:
     def of(self, stores: Mapping[str, xr.Dataset]) -> xr.Dataset:
         """Return the cases, without axes of one value; all of them done.
 
-        Raises
-        ------
-        StoreError
-            A case has not been computed.
-        CaseFailed
-            A case has failed or diverged.
-        InputError
-            There is no such case.
+        StoreError where one has not been computed, CaseFailed where one has failed or diverged, InputError
+        where there is none.
         """
         store = stores[self.study]
         chosen = select(store, self.choice).squeeze()
@@ -59,10 +53,7 @@ class Cases:
 def open_studies(folder: str | Path, names: Iterable[str]) -> dict[str, xr.Dataset]:
     """Return the stores of some studies of `jobs/paper`, lazily, by the names of their files.
 
-    Raises
-    ------
-    StoreError
-        One is missing.
+    StoreError where one is missing.
     """
     paths = {name: Path(folder) / f"{name}.zarr" for name in dict.fromkeys(names)}
     missing = [path.name for path in paths.values() if not path.exists()]

@@ -39,37 +39,16 @@ HOLDS, FAILS, REPORTED = "holds", "fails", "reported"
 
 @dataclass(frozen=True)
 class Claim:
-    """One statement of the paper that a machine can check.
-
-    Attributes
-    ----------
-    id : str
-        "C10"; ids that begin with D are discrepancies within the paper.
-    figure : str
-        Of the paper, with its panels: "6b", or "Table 1".
-    cases : Cases or tuple of Cases
-        Those whose quantity is taken.
-    says : str
-        The setting and the statement, in our words.
-    expected : str
-        What makes it hold; or why it is only reported, since the paper leaves its setting open or contradicts
-        itself.
-    quantity : function
-        Of one Dataset each of `cases`; a tuple of values becomes the arguments of `found` and `holds`.
-    found : function
-        Writes the quantity.
-    holds : function, optional
-        Whether the quantity is what is expected; none of a claim that is only reported.
-    """
+    """A statement of the paper that a machine can check; ids with D are of discrepancies within it."""
 
     id: str
-    figure: str
+    figure: str  # of the paper, with its panels: "6b", or "Table 1"
     cases: Cases | tuple[Cases, ...]
-    says: str
-    expected: str
-    quantity: Callable[..., Any]
-    found: Callable[..., str]
-    holds: Callable[..., bool] | None = None
+    says: str  # the setting and the statement, in our words
+    expected: str  # what makes it hold, or why it is only reported
+    quantity: Callable[..., Any]  # of one Dataset each of `cases`; a tuple becomes the arguments below
+    found: Callable[..., str]  # writes the quantity
+    holds: Callable[..., bool] | None = None  # none of a claim whose setting the paper leaves open
 
     @property
     def is_reported(self) -> bool:

@@ -172,13 +172,7 @@ def spectrum(case: xr.Dataset, signal: str) -> xr.DataArray:
 
 
 def heights(spectrum: xr.DataArray, *orders: float | Fraction) -> tuple[float, ...]:
-    """Return the amplitudes of the lines at some orders; the record holds whole numbers of their cycles.
-
-    Raises
-    ------
-    KeyError
-        There is no line at one of them.
-    """
+    """Return the amplitudes of the lines at some orders; the record holds whole numbers of their cycles."""
     found = (spectrum.sel(order=float(order), method="nearest", tolerance=1e-6) for order in orders)
     return tuple(map(float, found))
 
@@ -219,18 +213,10 @@ def durations(case: xr.Dataset) -> tuple[float, float, float]:
 
 
 def contact_rate(case: xr.Dataset) -> tuple[float, float, float, int, int]:
-    """Return how often there is contact.
+    """Return contacts a revolution and the part of the time, as they passed, and the part of the samples.
 
-    Returns
-    -------
-    rate, share : float
-        Contacts a revolution, and the part of the time, as they passed.
-    sampled : float
-        The part of the samples.
-    n_lacking : int
-        Revolutions without a whole contact in the record; its two ends may cut one.
-    n_sample : int
-        A revolution.
+    Then follow the revolutions without a whole contact, as the ends of the record may cut one, and the
+    samples of a revolution.
     """
     force = case["contact_force"]
     n_sample = samples_per_revolution(force)

@@ -294,13 +294,7 @@ def cascade(every: xr.Dataset, first: xr.Dataset) -> Figure:
 def draw_figures(
     numbers: Iterable[int], stores: Mapping[str, xr.Dataset], folder: str | Path
 ) -> Iterator[Path]:
-    """Draw figures into a folder, which is made, as figNN.png; yield their paths.
-
-    Raises
-    ------
-    InputError
-        The folder cannot be made or written to.
-    """
+    """Draw figures into a folder, which is made, as figNN.png; yield their paths."""
     folder = Path(folder)
     with writing(folder, "--draw"):
         folder.mkdir(parents=True, exist_ok=True)

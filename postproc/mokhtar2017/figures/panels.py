@@ -168,12 +168,8 @@ def tidy(ax: Axes) -> None:
 def page(rows: str, height: float, width: float | None = None) -> tuple[Figure, dict[str, Axes]]:
     """Return a figure and its panels by letter.
 
-    Parameters
-    ----------
-    rows : str
-        Rows of letters, as in "ab cc": panels a and b side by side over a wide panel c.
-    height, width : float
-        mm; by default, a page of one panel a row is one column wide, any other two.
+    Rows are as in "ab cc": panels a and b side by side over a wide panel c. Sizes are in mm; by default, a
+    page of one panel a row is one column wide, any other two.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

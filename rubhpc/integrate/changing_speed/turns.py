@@ -9,6 +9,7 @@ import numpy as np
 from rubhpc.integrate.measuring.monitors import carrier_displacement, monitored
 from rubhpc.integrate.measuring.rub_in_bores import rub_measures
 from rubhpc.integrate.measuring.samples import empty_samples, new_accumulator
+from rubhpc.kernels.accumulators import EXTREMA, SUMMED
 from rubhpc.kernels.resampling import resample
 
 if TYPE_CHECKING:
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     Ints = NDArray[np.int64]
 
 
-_SUMMED = ("n_contact", "contact_time", "impulse", "stick_time")
 MOST_WAITING = 128  # revolutions that are added at once
 
 
@@ -56,20 +56,17 @@ class Turns:
             return
         turns, accumulators = zip(*self._waiting, strict=True)
         self._waiting = []
-        names = (*_SUMMED, "friction_work", "least_slip", "peak_force", "peak_lateral")
-        new = {name: np.array([getattr(one, name) for one in accumulators]) for name in names}
+        new = {name: np.array([getattr(one, name) for one in accumulators]) for name in (*SUMMED, *EXTREMA)}
         at = list(turns)
-        together = self.together
         np.add.at(self.contact_time, at, new["contact_time"])
         np.add.at(self.friction_work, at, new["friction_work"])
         np.maximum.at(self.peak_force, at, new["peak_force"])
-        for name in _SUMMED:
-            total = getattr(together, name)
+        for name in SUMMED:
+            total = getattr(self.together, name)
             total += new[name].sum(axis=0)
-        np.minimum(together.least_slip, new["least_slip"].min(axis=0), out=together.least_slip)
-        for name in ("peak_force", "peak_lateral"):
-            largest = getattr(together, name)
-            np.maximum(largest, new[name].max(axis=0), out=largest)
+        for name, extreme in EXTREMA.items():
+            total = getattr(self.together, name)
+            extreme(total, extreme.reduce(new[name]), out=total)
 
 
 def contact_measures(

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
-    from rubhpc.study.study import Recording
+    from rubhpc.study.tables import Recording
 
     Floats = NDArray[np.float64]
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.periodic_motions.collocated_motion import FollowedMotion
     from rubhpc.integrate.periodic_motions.solved_motion import SolvedMotion, SolvedMotions
-    from rubhpc.study.study import Recording
+    from rubhpc.study.tables import Recording
 
     Floats = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rubhpc.integrate.marches.modal import ModalMarch, Place
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.integrate.periodic_motions.solved_motion import SolvedMotion
-    from rubhpc.study.study import Recording
+    from rubhpc.study.tables import Recording
 
     Floats = NDArray[np.float64]
 

@@ -27,7 +27,7 @@ from rubhpc.kernels.collocation.structures import (
 )
 from rubhpc.kernels.contact_modes import LATERAL_RATE, LATERAL_ROW, N_ROTOR_ROW
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, TORSION, V, W, rim_sense
-from rubhpc.kernels.laws import LAGRANGE, is_set_valued, is_varied
+from rubhpc.kernels.laws import LAGRANGE, depends_on_slip, may_stick
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -242,8 +242,8 @@ class FlightModes:
             friction=np.zeros(q),
             **normal_laws(setup.model, law),
             law=law,
-            is_sticky=bool(plain(is_set_valued)(law)),
-            is_varied=bool(plain(is_varied)(law)),
+            may_stick=bool(plain(may_stick)(law)),
+            depends_on_slip=bool(plain(depends_on_slip)(law)),
             translations=self.rows(setup.reduced.translations @ self.shape[:n]),
             displacement_limit=setup.displacement_limit,
         )
@@ -392,23 +392,29 @@ def energy_forms(
     """
     n_x = n_complex + exponent.size
     values = np.concatenate([exponent[:n_complex], exponent[:n_complex].conj(), exponent[n_complex:]])
-    to_modes = np.zeros((n_x, n_x), dtype=complex)
-    i = np.arange(n_complex)
-    to_modes[i, i], to_modes[i, n_complex + i] = 1.0, 1j
-    to_modes[n_complex + i, i], to_modes[n_complex + i, n_complex + i] = 1.0, -1j
-    j = np.arange(2 * n_complex, n_x)
-    to_modes[j, j] = 1.0
-    from_modes = np.linalg.inv(to_modes)
     total = values[:, None] + values
     is_resting = np.abs(total) <= RESTING * np.abs(exponent).max() * 1e-3
     gained, drift = np.zeros((2, 2, n_x, n_x))
     for kind, these in enumerate([slice(0, n_loss), slice(n_loss, None)]):
-        form = power[left[these]].T @ (sign[these, None] * power[right[these]])
-        form = from_modes.T @ (0.5 * (form + form.T)) @ from_modes
+        works = power[left[these]].T @ (sign[these, None] * power[right[these]])
+        form = _in_modes(_in_modes(0.5 * (works + works.T), n_complex).T, n_complex)
         grown = np.where(is_resting, 0.0, form / np.where(is_resting, 1.0, total))
-        gained[kind] = (to_modes.T @ grown @ to_modes).real
-        drift[kind] = (to_modes.T @ np.where(is_resting, form, 0.0) @ to_modes).real
+        gained[kind] = _in_parts(_in_parts(grown, n_complex).T, n_complex).real
+        drift[kind] = _in_parts(_in_parts(np.where(is_resting, form, 0.0), n_complex).T, n_complex).real
     return gained, drift
+
+
+def _in_modes(form: Floats | Complexes, n_complex: int) -> Complexes:
+    """Rows of a form of real and imaginary parts of `n_complex` modes as those of modes and conjugates."""
+    real, imaginary = form[:n_complex], form[n_complex : 2 * n_complex]
+    halves = 0.5 * (real - 1j * imaginary), 0.5 * (real + 1j * imaginary)
+    return np.concatenate([*halves, form[2 * n_complex :]])
+
+
+def _in_parts(form: Complexes, n_complex: int) -> Complexes:
+    """Inverse of `_in_modes`."""
+    direct, conjugate = form[:n_complex], form[n_complex : 2 * n_complex]
+    return np.concatenate([direct + conjugate, 1j * (direct - conjugate), form[2 * n_complex :]])
 
 
 def motion_rows(reduced: ReducedModel, model: Model, accuracy: float) -> Floats:
@@ -421,10 +427,12 @@ def motion_rows(reduced: ReducedModel, model: Model, accuracy: float) -> Floats:
     ey, ez = np.cos(angle), np.sin(angle)
     v, w, torsion, axial, lateral = (reduced.degree[:, a] for a in (V, W, TORSION, AXIAL, LATERAL))
     across = lateral + ez * v - ey * w
-    bending = [
-        foreshortening_rows(bending_rows(stator, reduced, model, i), across[i], reduced.stiffness, accuracy)
-        for i, stator in enumerate(model.stators)
-    ]
+    bending = foreshortening_rows(
+        [bending_rows(stator, reduced, model, i) for i, stator in enumerate(model.stators)],
+        across,
+        reduced.stiffness,
+        accuracy,
+    )
     rows = np.zeros((len(bending), BENDING + max(map(len, bending)), v.shape[1]))
     rows[:, ALONG], rows[:, ACROSS] = axial - ey * v - ez * w, across
     rows[:, TWIST] = np.array([stator.radius for stator in model.stators])[:, None] * torsion
@@ -460,18 +468,24 @@ def output_rows(reduced: ReducedModel) -> Floats:
     return np.ascontiguousarray(np.swapaxes(np.array(rows), 0, 1))
 
 
-def foreshortening_rows(rows: Floats, across: Floats, stiffness: Floats, accuracy: float) -> Floats:
-    """Rows (b, n) whose squares add up to twice the foreshortening of a stator, for the accuracy asked for.
+def foreshortening_rows(
+    rows: list[Floats], across: Floats, stiffness: Floats, accuracy: float
+) -> list[Floats]:
+    """Rows (b, n) whose squares add up to twice the foreshortening of each stator, as accuracy requires.
 
     They are those of the pencil of foreshortening and stiffness, the first ones in the order of what they
-    add where a static force across the axis, (n,), bends the stator. `rows` (r, n) are as `bending_rows`.
+    add where a static force across the axis, (q, n), bends the stator. `rows` are those of `bending_rows`.
     """
-    if not len(rows):
+    if not any(map(len, rows)):
         return rows
-    compliant = np.linalg.lstsq(stiffness, np.vstack([rows, across]).T, rcond=None)[0]
-    turn = np.linalg.eigh(rows @ compliant[:, :-1])[1].T[::-1]
-    share = np.square(turn @ rows @ compliant[:, -1])
-    missed = share.sum() - np.cumsum(share)
-    n_kept = 1 + int(np.count_nonzero(missed > ENOUGH * accuracy * share.sum()))
-    kept: Floats = (turn @ rows)[:n_kept]
+    ends = np.cumsum([1 + len(of_pair) for of_pair in rows])
+    forces = np.vstack([row for pair in zip(rows, across, strict=True) for row in pair])
+    compliant = np.linalg.lstsq(stiffness, forces.T, rcond=None)[0]
+    kept = []
+    for of_pair, moved in zip(rows, np.split(compliant, ends[:-1], axis=1), strict=True):
+        turn = np.linalg.eigh(of_pair @ moved[:, :-1])[1].T[::-1]
+        share = np.square(turn @ of_pair @ moved[:, -1])
+        missed = share.sum() - np.cumsum(share)
+        n_kept = 1 + int(np.count_nonzero(missed > ENOUGH * accuracy * share.sum()))
+        kept.append((turn @ of_pair)[:n_kept])
     return kept

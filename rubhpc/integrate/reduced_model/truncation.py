@@ -22,7 +22,7 @@ from rubhpc.integrate.packing import (
 from rubhpc.integrate.reduced_model.coupling import Grouped, coupled_parts
 from rubhpc.kernels._jit import plain
 from rubhpc.kernels.accumulators import TWIST
-from rubhpc.kernels.laws import is_set_valued
+from rubhpc.kernels.laws import may_stick
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -229,7 +229,7 @@ def touch_of(model: Model, law: Law, *, is_updated: bool) -> Touch:
     if is_soft:
         stiffest = laws["stiffness"].argmax()
         spring, damper = float(laws["stiffness"][stiffest]), float(laws["damping"][stiffest])
-    return Touch(plain(is_set_valued)(law), is_updated or is_bent, spring, damper, bounces)
+    return Touch(plain(may_stick)(law), is_updated or is_bent, spring, damper, bounces)
 
 
 class Ringing(NamedTuple):

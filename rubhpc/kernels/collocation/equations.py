@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.collocation.gaps import see_bend, slip_path
-from rubhpc.kernels.collocation.laws import friction_ratio, spring_force
+from rubhpc.kernels.collocation.laws import sliding_coefficient, spring_force
 from rubhpc.kernels.collocation.motions import n_force
 from rubhpc.kernels.collocation.structures import (
     ACROSS,
@@ -137,9 +137,9 @@ def fill_residual(
                 residual[row + k - 1] = path
             residual[row + s - 1] = step * (end[SLIP] - fade[s - 1, 3] * first[SLIP])
             row += s
-        elif bodies.is_varied:
+        elif bodies.depends_on_slip:
             for k in range(s):
-                residual[row + k] = t[k] - state[i] * friction_ratio(bodies, i, seen[k, SLIP])[0] * n[k]
+                residual[row + k] = t[k] - state[i] * sliding_coefficient(bodies, i, seen[k, SLIP])[0] * n[k]
             row += s
     for c in range(0 if bodies.is_straight else n_closed):
         i = solution.closed[c]
@@ -180,8 +180,8 @@ def fill_slopes(
                     of_rate += of_normal[a, b] * rates[v + b]
                     of_slip -= rates[v + b] * of_tangent[b, a]
                 bent[OF_RATE, a], bent[OF_SLIP, a], bent[OF_BEND, a] = of_rate, of_slip, 0.0
-            if bodies.is_varied and state[i] != STICKING:
-                solution.ratio[row, RATIO], solution.ratio[row, RATIO_SLOPE] = friction_ratio(
+            if bodies.depends_on_slip and state[i] != STICKING:
+                solution.ratio[row, RATIO], solution.ratio[row, RATIO_SLOPE] = sliding_coefficient(
                     bodies, i, seen[SLIP]
                 )
             if bodies.normal_law[i] != LAGRANGE:
@@ -338,7 +338,7 @@ def change_residual(
             target[row + k - 1] = path
         target[row + s - 1] = step * (end[SLIP] - fade[s - 1, 3] * first[SLIP])
         row += s
-    elif bodies.is_varied:
+    elif bodies.depends_on_slip:
         for k in range(s):
             ratio = solution.ratio[i * s + k]
             grown = ratio[RATIO] * pushed[NORMAL, k] + n[k] * ratio[RATIO_SLOPE] * changed[k, SLIP]

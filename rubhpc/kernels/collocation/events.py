@@ -122,7 +122,7 @@ def fill_events(
                 event[i, NORMAL, k] = force[i, NORMAL, k]
             else:
                 event[i, NORMAL, k] = spring_end(bodies, i, solution.seen[row, GAP], solution.seen[row, RATE])
-            if not bodies.is_sticky:
+            if not bodies.may_stick:
                 continue
             if state[i] == STICKING:  # breaks away beyond the error of T: else stick and slip would alternate
                 bound = (1.0 + BREAKING * accuracy) * static_friction(bodies, i) * force[i, NORMAL, k]
@@ -170,7 +170,7 @@ def first_event(
                     place, pair, kind = root, i, NORMAL
                 continue
         for f in range(2):
-            if f == FRICTION and (state[i] == OPEN or not bodies.is_sticky):
+            if f == FRICTION and (state[i] == OPEN or not bodies.may_stick):
                 continue
             root = first_root(nodes, event[i, f], begin if f == NORMAL else 0.0)
             if f == NORMAL and state[i] != OPEN and root == 0.0 and values[1] > 0.0 and values[s - 1] > 0.0:

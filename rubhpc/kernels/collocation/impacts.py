@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.collocation.gaps import see_bend, see_gap
-from rubhpc.kernels.collocation.laws import friction_ratio, spring_force
+from rubhpc.kernels.collocation.laws import sliding_coefficient, spring_force
 from rubhpc.kernels.collocation.structures import (
     FRICTION,
     NORMAL,
@@ -110,7 +110,7 @@ def find_forces(bodies: Bodies, s: int, state: Ints, solution: Solution, force: 
                     rows[q + i, j] = coupling(bodies, tangent, row, i, normal, j * s, j)
                     rows[q + i, q + j] = coupling(bodies, tangent, row, i, tangent, j * s, j)
         else:
-            rows[q + i, i] = -state[i] * friction_ratio(bodies, i, solution.seen[row, SLIP])[0]
+            rows[q + i, i] = -state[i] * sliding_coefficient(bodies, i, solution.seen[row, SLIP])[0]
     if not eliminate(rows, 2 * q):
         return False
     for i in range(q):
@@ -169,8 +169,8 @@ def impulse_of(
         coupling(bodies, normal, row, i, normal, row, i),
         coupling(bodies, normal, row, i, tangent, row, i),
     )
-    ratio = friction_ratio(bodies, i, solution.speed[i, FRICTION])[0]
-    if not bodies.is_sticky or opening >= 0.0:
+    ratio = sliding_coefficient(bodies, i, solution.speed[i, FRICTION])[0]
+    if not bodies.may_stick or opening >= 0.0:
         n = -opening / (a + ratio * b)
         return n, ratio * n
     c, d = (
@@ -194,7 +194,7 @@ def is_jammed(bodies: Bodies, s: int, i: int, state: int, solution: Solution) ->
     row = i * s
     if state in (STICKING, OPEN) or bodies.normal_law[i] != LAGRANGE:
         return False
-    ratio = state * friction_ratio(bodies, i, solution.seen[row, SLIP])[0]
+    ratio = state * sliding_coefficient(bodies, i, solution.seen[row, SLIP])[0]
     along = coupling(bodies, solution.normal, row, i, solution.normal, row, i)
     return not along + ratio * coupling(bodies, solution.normal, row, i, solution.tangent, row, i) > 0.0
 

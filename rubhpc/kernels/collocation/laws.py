@@ -31,7 +31,7 @@ def spring_end(bodies: Bodies, i: int, gap: float, rate: float) -> float:
 
 
 @linked_sum
-def friction_ratio(bodies: Bodies, i: int, slip: float) -> tuple[float, float]:
+def sliding_coefficient(bodies: Bodies, i: int, slip: float) -> tuple[float, float]:
     """Coefficient of friction in sliding at a slip (m/s), and its slope in it."""
     return sliding_friction(bodies.law, bodies.friction[i], slip)
 

@@ -214,7 +214,7 @@ def take_event(
     lowest, top = int(np.int64(0)), tables.is_filled.size - 1
     if state[pair] == OPEN:
         state[pair] = FORWARD
-        solution.waiting[pair] = bodies.is_sticky
+        solution.waiting[pair] = bodies.may_stick
         case.since[pair] = progress.tick
         if was_alone:
             memory.scale = LEAST_SCALE
@@ -309,7 +309,7 @@ def strike(
                 memory.unseen = 1
                 continue
         state[i] = FORWARD if not solution.kept[i] else state[i]
-        solution.waiting[i] = bodies.is_sticky
+        solution.waiting[i] = bodies.may_stick
     if is_recorded:
         record_impulses(bodies, s, clock, progress, solution, seen)
 
@@ -426,7 +426,7 @@ def advance_by_collocation(
     trial = int(np.int64(-1))
     if memory.is_new != KNOWN and any_closed(state):
         for i in range(state.size):
-            solution.waiting[i] = memory.is_new == NEW and bodies.is_sticky and state[i] != OPEN
+            solution.waiting[i] = memory.is_new == NEW and bodies.may_stick and state[i] != OPEN
         todo = TRYING
     memory.is_new = KNOWN
     while True:
@@ -521,7 +521,7 @@ def advance_by_collocation(
                 fill_step(bodies, nodes, tables, slot)
             step = tables.tick * 2.0 ** (tables.first_level + slot)
             is_exact = trail is not None and trail.columns.shape[1] > 0 and todo == STEPPING
-            is_whole = is_recorded or bodies.is_sticky or is_exact or state.size > 1
+            is_whole = is_recorded or bodies.may_stick or is_exact or state.size > 1
             n_iteration = take_step(
                 bodies,
                 nodes,

@@ -27,7 +27,7 @@ Ints = NDArray[np.int64]
 @linked_sum
 def n_force(bodies: Bodies, state: int) -> int:
     """Unknown forces of a closed pair at a node."""
-    return 1 if state != STICKING and not bodies.is_varied else 2
+    return 1 if state != STICKING and not bodies.depends_on_slip else 2
 
 
 @linked_sum

@@ -40,7 +40,7 @@ from rubhpc.kernels.collocation.structures import (
 )
 from rubhpc.kernels.collocation.tables import place_row
 from rubhpc.kernels.elimination import eliminate
-from rubhpc.kernels.laws import HERTZ, LAGRANGE
+from rubhpc.kernels.laws import LAGRANGE, PENALTY
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -252,10 +252,10 @@ def take_step(
     n_closed, n_pushed, n = list_closed(bodies, nodes, state, solution)
     place, residual, load, states = solution.place, solution.residual, solution.load, solution.states
     answer = solution.answer
-    is_lean, is_linear = not bodies.is_varied, bodies.is_straight and not bodies.is_varied
+    is_lean, is_linear = not bodies.depends_on_slip, bodies.is_straight and not bodies.depends_on_slip
     for c in range(n_closed):
         law = bodies.normal_law[solution.closed[c]]
-        is_lean, is_linear = is_lean and law == LAGRANGE, is_linear and law != HERTZ
+        is_lean, is_linear = is_lean and law == LAGRANGE, is_linear and law in (LAGRANGE, PENALTY)
     n_block, free = 2 * s - 1, tables.free[slot]
     used_blocks = (0, s if is_lean else n_block)
     step, forced = tables.tick * 2.0 ** (tables.first_level + slot), tables.forced[slot]

@@ -426,9 +426,7 @@ def record_contact(
         done = until
     if bodies.radius[i] < 0.0:
         accumulator.turned[i] += turn_of(nodes, i, share, solution, part)
-    whole = step * integral_of(nodes, n, 0.0, share)
     accumulator.contact_time[i] += length
-    accumulator.impulse[i] += whole
     before, first = value_at(nodes, n, 0.0), 0.0
     for k in range(1, s):
         at = nodes.at[k] * share
@@ -442,7 +440,7 @@ def record_contact(
         slip = solution.seen[i * s + k, SLIP]
         if state[i] != STICKING and nodes.at[k] <= share and slip != 0.0:
             sense = FORWARD if slip > 0.0 else BACKWARD
-            observe_sense(i, state[i] if bodies.is_sticky else sense, accumulator)  # at rest slip is rounding
+            observe_sense(i, state[i] if bodies.may_stick else sense, accumulator)  # at rest slip is rounding
     drive = bodies.rim_speed[i] * step * integral_of(nodes, t, 0.0, share)
     worked = 0.0
     for k in range(s):
@@ -454,11 +452,10 @@ def record_contact(
         for k in range(s):
             part[k] *= t[k]
         worked = step * integral_of(nodes, part, 0.0, share)
-    if state[i] == STICKING or (state[i] == FORWARD and bodies.is_sticky):  # below zero it is an error
+    if state[i] == STICKING or (state[i] == FORWARD and bodies.may_stick):  # below zero it is an error
         lowest = max(0.0, lowest) if state[i] == FORWARD else 0.0
     accumulator.least_slip[i] = min(accumulator.least_slip[i], lowest)
-    accumulator.friction_work[i] += worked
-    observe_rub(drive, worked, accumulator)
+    observe_rub(i, step * integral_of(nodes, n, 0.0, share), drive, worked, accumulator)
     if bodies.normal_law[i] != LAGRANGE:
         for k in range(s):
             part[k] = n[k] * solution.seen[i * s + k, RATE]
@@ -516,9 +513,7 @@ def record_impulses(
             samples.force[i, i_sample] += n / interval
             for k in range(4 if samples.push.shape[0] > 0 else 0):
                 samples.push[i, k, i_sample] += push_of(bodies, i, i * s, k, n, t, solution) / interval
-        accumulator.impulse[i] += n
         observe_force(i, progress.tick * clock.tick, 0.0, n, 0.0, 0.0, accumulator)
         accumulator.least_slip[i] = min(accumulator.least_slip[i], before, after)
-        accumulator.friction_work[i] += t * slip
-        observe_rub(t * bodies.rim_speed[i], t * slip, accumulator)
+        observe_rub(i, n, t * bodies.rim_speed[i], t * slip, accumulator)
         accumulator.energy[IMPACT_LOSS] -= n * rate

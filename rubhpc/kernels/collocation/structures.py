@@ -67,8 +67,8 @@ class Bodies(Struct):
     damping: Floats  # (q,), N s/m, or s/m of Hertz
     restitution: Floats  # (q,)
     law: Law  # of friction
-    is_sticky: bool  # friction may stick and reverse
-    is_varied: bool  # the coefficient of friction depends on the slip
+    may_stick: bool  # friction may stick and reverse
+    depends_on_slip: bool  # the coefficient of friction depends on the slip
     translations: Floats  # (t, nx), displacements that are compared with the limit
     displacement_limit: float  # m
 

@@ -7,10 +7,15 @@ import numpy as np
 import pytest
 
 from rubhpc import Bore, Carrier, LumpedStator, MatrixCarrier, read_rig, run_up, simulate
+from rubhpc.integrate.changing_speed.case import record_run_up
 from rubhpc.integrate.measuring.rub_in_bores import arc_of
+from rubhpc.integrate.setup import prepare
 from rubhpc.rig.normal_law import NormalLaw
 from rubhpc.rig.reading import with_keys
 from rubhpc.schema import RUB_KIND
+from rubhpc.study.contact_keys import Contact
+from rubhpc.study.speed_law import SpeedLaw
+from rubhpc.study.tables import Integrator, Recording
 
 PACKAGED = read_rig("mokhtar2017")
 HOLE = Bore(node=8, mass=1.5, stiffness=4e6, damping=200.0)
@@ -159,6 +164,19 @@ def test_run_up_in_a_bore():
     force = np.hypot(found.contact_force_vertical, found.contact_force_horizontal).values
     normal = found.contact_force.values
     assert force[normal > 1.0] == pytest.approx(normal[normal > 1.0] * math.hypot(1.0, 0.05), rel=2e-2)
+
+
+def test_kind_of_a_rub_at_a_changing_speed():
+    """The contact point goes around with the unbalance, as at constant speed."""
+    law = SpeedLaw(time=(0.0, 1.0), speed=(270.0, 290.0))
+    recording = Recording(transient=0, revolutions=law.n_revolution, samples_per_revolution=64)
+    setup = prepare(bored(HOLE), 290.0, contact=Contact(), integrator=Integrator(), samples_per_revolution=64)
+    start = simulate(bored(HOLE), **CASE | {"speed_ratio": None, "speed": 270.0}).final
+    case = {"recording": recording, "initial": start, "clearance": 80e-6, "friction": 0.1}
+    found = record_run_up(setup, law, **case).measures
+    assert RUB_KIND[found["rub_kind"][0]] == "forward"
+    assert found["whirl_frequency"] == pytest.approx(280.0, rel=0.01)
+    assert found["contact_fraction"] == pytest.approx(1.0)
 
 
 def test_it_rests_in_a_bore_under_its_weight():
