@@ -13,9 +13,9 @@ from scipy.sparse.csgraph import connected_components
 
 from rubhpc.fem.statics import sag_at_stators
 from rubhpc.kernels._jit import plain
+from rubhpc.kernels.central_difference.linear import Linear
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, N_DEGREE, TORSION, Pairs, V, W, rim_sense
 from rubhpc.kernels.laws import MULTIPLIER, Law
-from rubhpc.kernels.linear import Linear
 from rubhpc.models import FRICTION_LAWS, NORMAL_LAWS
 
 if TYPE_CHECKING:

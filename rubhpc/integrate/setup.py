@@ -21,7 +21,7 @@ from rubhpc.integrate.packing import Packed, degrees_of, law_of, pack
 from rubhpc.integrate.reduced_model.reduction import reduce_model, reduced_sag
 from rubhpc.integrate.reduced_model.truncation import touch_of
 from rubhpc.integrate.scheme import Scheme, scheme_of
-from rubhpc.kernels.central_difference import Stepper
+from rubhpc.kernels.central_difference.march import Stepper
 from rubhpc.kernels.contact_pairs import LATERAL, V, W
 from rubhpc.kernels.laws import MULTIPLIER
 from rubhpc.rig.rotors import Rotor

@@ -31,7 +31,7 @@ def test_each_part_is_announced_once(monkeypatch):
 
 
 def test_parts_are_names_of_kernels():
-    from rubhpc.kernels import revolutions, small_changes
+    from rubhpc.kernels.closed_form import revolutions, small_changes
     from rubhpc.kernels.collocation import march
 
     modules = revolutions, small_changes, march

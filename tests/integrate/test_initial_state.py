@@ -24,7 +24,7 @@ from rubhpc.integrate.overlaps import gaps
 from rubhpc.integrate.record import State
 from rubhpc.integrate.setup import prepare
 from rubhpc.integrate.start import _least_forces, at_rest, fit_to_gaps, start_of
-from rubhpc.kernels.mode_change import GAP_TOLERANCE
+from rubhpc.kernels.closed_form.mode_change import GAP_TOLERANCE
 from rubhpc.study.initial import Initial
 from rubhpc.study.study import Integrator, Recording
 

@@ -20,7 +20,7 @@ from rubhpc.kernels.accumulators import (
     VERTICAL,
     observe_contact,
 )
-from rubhpc.kernels.central_difference import FINISHED
+from rubhpc.kernels.central_difference.march import FINISHED
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL, TORSION
 from rubhpc.rig.parts import Bearing
 

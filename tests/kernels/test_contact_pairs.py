@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from scipy.optimize import root
 
 from rubhpc.integrate.marches.workspace import workspace
+from rubhpc.kernels.central_difference.contact_forces import fill_residual
+from rubhpc.kernels.central_difference.contact_forces import solve_contact as compiled_solve_contact
 from rubhpc.kernels.complementarity import UNSOLVED
-from rubhpc.kernels.contact_forces import fill_residual
-from rubhpc.kernels.contact_forces import solve_contact as compiled_solve_contact
 from rubhpc.kernels.contact_pairs import (
     AXIAL,
     LATERAL,

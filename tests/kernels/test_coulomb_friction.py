@@ -8,7 +8,7 @@ from kernel_case import KernelCase
 from scipy.optimize import linprog
 from trial_rig import trial_rig
 
-from rubhpc.kernels.central_difference import FINISHED
+from rubhpc.kernels.central_difference.march import FINISHED
 from rubhpc.kernels.complementarity import UNSOLVED
 from rubhpc.kernels.laws import COULOMB as COULOMB_LAW
 from rubhpc.kernels.laws import MULTIPLIER

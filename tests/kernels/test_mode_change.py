@@ -7,8 +7,8 @@ import pytest
 
 from rubhpc.integrate.measuring.samples import new_accumulator
 from rubhpc.kernels.accumulators import DRIVE_WORK, FRICTION_LOSS, IMPACT, IMPACT_LOSS, PRESSING
+from rubhpc.kernels.closed_form.mode_change import change_contacts, event_work
 from rubhpc.kernels.contact_modes import Reduced
-from rubhpc.kernels.mode_change import change_contacts, event_work
 
 N, SPIN, MOMENT = 7, 150.0, 1e-7
 ANGLE = 0.8

@@ -12,7 +12,7 @@ from rubhpc.fem.assemble import assemble
 from rubhpc.integrate.marches.workspace import workspace
 from rubhpc.integrate.measuring.samples import empty_samples, new_accumulator
 from rubhpc.integrate.packing import pack, pairs_of
-from rubhpc.kernels.central_difference import Stepper, advance
+from rubhpc.kernels.central_difference.march import Stepper, advance
 from rubhpc.kernels.laws import MULTIPLIER
 
 if TYPE_CHECKING:

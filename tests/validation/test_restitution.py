@@ -12,7 +12,7 @@ from trial_rig import trial_rig
 
 from rubhpc import Load, LumpedStator, Rig, State
 from rubhpc.integrate.case import run_case
-from rubhpc.kernels.central_difference import FINISHED
+from rubhpc.kernels.central_difference.march import FINISHED
 from rubhpc.kernels.laws import MULTIPLIER
 from rubhpc.rig.reading import with_keys
 from rubhpc.rig.rotors import MatrixRotor

@@ -11,7 +11,7 @@ import numpy as np
 
 from rubhpc.integrate.periodic_motions.shooting import floquet_multipliers
 from rubhpc.kernels._jit import plain
-from rubhpc.kernels.mode_change import AT_REST, HIDDEN, OPENING, least_flight
+from rubhpc.kernels.closed_form.mode_change import AT_REST, HIDDEN, OPENING, least_flight
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -43,10 +43,10 @@ def staying_closed(case: Motion, revolutions: Iterable[Any]) -> Floats:
     A pair that touches, or is closed when another one touches, parts where the impact sends it away, or where
     nothing presses it after the impact. It may touch again within a ten-thousandth of a revolution: one
     contact more, without a gap or a force with a minimum of zero. The first row is the additional speed with
-    which a pair would part for good (`kernels.mode_change`), over the speed of a whirl in the gap; impulses
-    that hold it count as the speeds that they change. The second row is its force after the touch, N.
-    Infinite for a pair that stays closed at no touch, and for all
-    pairs without closed form, where contacts appear and vanish by gaps and forces alone.
+    which a pair would part for good (`kernels.closed_form.mode_change`), over the speed of a whirl in the
+    gap; impulses that hold it count as the speeds that they change. The second row is its force after the
+    touch, N. Infinite for a pair that stays closed at no touch, and for all pairs without closed form, where
+    contacts appear and vanish by gaps and forces alone.
     """
     least = np.full((2, case.q), np.inf)
     if not case.is_exact:

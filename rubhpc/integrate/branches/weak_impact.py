@@ -13,7 +13,7 @@ from rubhpc.integrate.periodic_motions.piecewise_motion import Unfollowed
 from rubhpc.integrate.periodic_motions.revolution import cut, joined, least_of
 from rubhpc.integrate.periodic_motions.saltation import carried, tangents
 from rubhpc.integrate.periodic_motions.shooting import NotConverged
-from rubhpc.kernels.mode_change import GAP_TOLERANCE
+from rubhpc.kernels.closed_form.mode_change import GAP_TOLERANCE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels.courses import Course, Courses, take_course
-from rubhpc.kernels.filling import ModeCourse
-from rubhpc.kernels.filling_energies import Losses
+from rubhpc.kernels.closed_form.courses import Course, Courses, take_course
+from rubhpc.kernels.closed_form.filling import ModeCourse
+from rubhpc.kernels.closed_form.filling_energies import Losses
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

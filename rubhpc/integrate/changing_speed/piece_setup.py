@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from rubhpc.fem.model import Model
     from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
+    from rubhpc.kernels.closed_form.filling import Speeds
     from rubhpc.kernels.contact_modes import Reduced
-    from rubhpc.kernels.filling import Speeds
 
     Floats = NDArray[np.float64]
     Complexes = NDArray[np.complex128]

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rubhpc.fem.model import Model
     from rubhpc.integrate.changing_speed.piece_setup import HeldMatrices, PieceSetup
     from rubhpc.integrate.modal_setup import ModalSetup
-    from rubhpc.kernels.filling import Speeds
+    from rubhpc.kernels.closed_form.filling import Speeds
 
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]

@@ -1,7 +1,7 @@
 """Contact modes over a range of speeds, filled for the speeds of a run-up's pieces, several of them at once.
 
 They are solved when first met, at three speeds of the range (`mode_courses`). The unbalance response and the
-exponentials are made anew for each piece (`kernels.filling`).
+exponentials are made anew for each piece (`kernels.closed_form.filling`).
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from rubhpc.integrate.changing_speed.mode_courses import (
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
 from rubhpc.integrate.reduced_model.table_stack import TableStack
 from rubhpc.integrate.reduced_model.touching import OpenBodies, open_bodies
+from rubhpc.kernels.closed_form.filling import Speeds, fill
 from rubhpc.kernels.contact_modes import LANES, SAMPLES_AT_ONCE
 from rubhpc.kernels.contact_pairs import AXIAL, LATERAL
-from rubhpc.kernels.filling import Speeds, fill
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     from rubhpc.fem.model import Model
     from rubhpc.integrate.reduced_model.contact_mode import ContactMode
     from rubhpc.integrate.reduced_model.reduction import ReducedModel
+    from rubhpc.kernels.closed_form.filling import ModeCourse
     from rubhpc.kernels.contact_modes import ModeTables
-    from rubhpc.kernels.filling import ModeCourse
 
     Ints = NDArray[np.int64]
 

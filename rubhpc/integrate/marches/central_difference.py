@@ -12,7 +12,7 @@ from rubhpc.integrate.measuring.divergence import displacement_reason, energy_re
 from rubhpc.integrate.measuring.samples import empty_samples, new_accumulator
 from rubhpc.integrate.packing import pairs_of
 from rubhpc.integrate.record import State
-from rubhpc.kernels import central_difference as kernel
+from rubhpc.kernels.central_difference import march as kernel
 from rubhpc.kernels.contact_pairs import V, W, fill_directions, pair_normal_and_gap
 
 if TYPE_CHECKING:

@@ -12,9 +12,9 @@ from rubhpc.integrate.marches.met_modes import MetModes, NoClosedForm
 from rubhpc.integrate.marches.modal import ModalMarch, slowest_fast
 from rubhpc.integrate.measuring.samples import no_record
 from rubhpc.kernels.case_progress import MODE_WANTED, NO_SECTIONS, Sections, restart_clock
+from rubhpc.kernels.closed_form.event_loop import advance
+from rubhpc.kernels.closed_form.mode_change import EventWork, change_contacts, event_work
 from rubhpc.kernels.contact_modes import DYING, FORCED_LEVEL
-from rubhpc.kernels.event_loop import advance
-from rubhpc.kernels.mode_change import EventWork, change_contacts, event_work
 from rubhpc.kernels.sampling import Measured
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rubhpc.kernels.contact_forces import fill_compliances
+from rubhpc.kernels.central_difference.contact_forces import fill_compliances
 from rubhpc.kernels.contact_pairs import N_DEGREE, Pairs, Workspace, fill_directions, fill_friction_direction
 
 

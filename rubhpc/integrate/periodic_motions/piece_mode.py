@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels.flow import PieceTables
-from rubhpc.kernels.revolutions import PieceModes
+from rubhpc.kernels.closed_form.flow import PieceTables
+from rubhpc.kernels.closed_form.revolutions import PieceModes
 
 if TYPE_CHECKING:
     from rubhpc.integrate.marches.event_driven import EventDrivenMarch

@@ -21,8 +21,8 @@ from rubhpc.integrate.periodic_motions.revolution import (
 )
 from rubhpc.integrate.periodic_motions.saltation import carried, monodromy
 from rubhpc.integrate.periodic_motions.tolerances import TO_ROUNDING
-from rubhpc.kernels.flow import Timing, piece_room
-from rubhpc.kernels.revolutions import (
+from rubhpc.kernels.closed_form.flow import Timing, piece_room
+from rubhpc.kernels.closed_form.revolutions import (
     BEYOND,
     FOLLOWED,
     FULL,
@@ -35,7 +35,7 @@ from rubhpc.kernels.revolutions import (
     new_passage,
     piece_rows,
 )
-from rubhpc.kernels.small_changes import ChangeRoom, change_room
+from rubhpc.kernels.closed_form.small_changes import ChangeRoom, change_room
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

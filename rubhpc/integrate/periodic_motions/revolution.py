@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.kernels.flow import BEFORE
-from rubhpc.kernels.revolutions import AFTER, PieceRows, piece_rows
+from rubhpc.kernels.closed_form.flow import BEFORE
+from rubhpc.kernels.closed_form.revolutions import AFTER, PieceRows, piece_rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from rubhpc.kernels.small_changes import ALL_CARRIED, carry_pieces
+from rubhpc.kernels.closed_form.small_changes import ALL_CARRIED, carry_pieces
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
     from rubhpc.integrate.periodic_motions.piece_mode import Mode
     from rubhpc.integrate.periodic_motions.revolution import Revolution
+    from rubhpc.kernels.closed_form.revolutions import PieceModes, PieceRows
+    from rubhpc.kernels.closed_form.small_changes import ChangeRoom
     from rubhpc.kernels.contact_modes import Reduced
-    from rubhpc.kernels.revolutions import PieceModes, PieceRows
-    from rubhpc.kernels.small_changes import ChangeRoom
 
     Floats = NDArray[np.float64]
 
@@ -65,7 +65,7 @@ def carried(motion: Followed, rows: PieceRows, columns: Floats) -> Floats:
 
 
 def _carry(motion: Followed, rows: PieceRows, columns: Floats, kept: Floats) -> None:
-    """Carry small changes through pieces, in place (`kernels.small_changes.carry_pieces`)."""
+    """Carry small changes through pieces, in place (`kernels.closed_form.small_changes.carry_pieces`)."""
     piece = 0
     while True:
         motion.mode(int(rows.states[piece, 0]))

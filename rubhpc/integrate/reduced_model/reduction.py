@@ -21,9 +21,9 @@ from rubhpc.integrate.reduced_model.truncation import (
     seen_degrees,
 )
 from rubhpc.kernels._jit import plain
+from rubhpc.kernels.closed_form.mode_change import GAP_TOLERANCE
 from rubhpc.kernels.contact_modes import Reduced
 from rubhpc.kernels.contact_pairs import LATERAL, N_DEGREE, TORSION, V, W, rim_sense
-from rubhpc.kernels.mode_change import GAP_TOLERANCE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

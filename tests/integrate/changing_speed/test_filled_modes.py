@@ -16,8 +16,8 @@ from rubhpc.integrate.reduced_model.touching import (
     mode_among,
     open_bodies,
 )
+from rubhpc.kernels.closed_form.measuring import energies_gained
 from rubhpc.kernels.contact_modes import enter
-from rubhpc.kernels.measuring import energies_gained
 
 energies_gained = called(energies_gained)
 enter = called(enter)

@@ -10,7 +10,7 @@ from closed_form import read_rig
 from kernel_case import KernelCase
 from scipy.linalg import block_diag
 
-from rubhpc.kernels.central_difference import CONTACT_UNSOLVED, DIVERGED, FINISHED
+from rubhpc.kernels.central_difference.march import CONTACT_UNSOLVED, DIVERGED, FINISHED
 from rubhpc.kernels.contact_pairs import V
 from rubhpc.rig.parts import Bearing
 from rubhpc.rig.reading import with_keys

@@ -14,6 +14,7 @@ from rubhpc.integrate.reduced_model import mode_library
 from rubhpc.integrate.reduced_model.contact_mode import solve_contact_mode
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
 from rubhpc.integrate.reduced_model.reduction import directions, reduce_model
+from rubhpc.kernels.closed_form.measuring import energies_gained
 from rubhpc.kernels.contact_modes import (
     LANES,
     LATERAL_RATE,
@@ -26,7 +27,6 @@ from rubhpc.kernels.contact_modes import (
     find_mode,
 )
 from rubhpc.kernels.coordinate_steps import floor_log2
-from rubhpc.kernels.measuring import energies_gained
 
 energies_gained = called(energies_gained)
 enter = called(enter)

@@ -15,10 +15,10 @@ from rubhpc.kernels.case_progress import (
     Progress,
     shaft_turn,
 )
+from rubhpc.kernels.closed_form.event_steps import enter_wanted, leave_mode, record_event, record_touch
+from rubhpc.kernels.closed_form.measuring import begin_contact, begin_span
+from rubhpc.kernels.closed_form.mode_change import EventWork, change_contacts
 from rubhpc.kernels.contact_modes import FORCED_LEVEL, ModeTables, Reduced
-from rubhpc.kernels.event_steps import enter_wanted, leave_mode, record_event, record_touch
-from rubhpc.kernels.measuring import begin_contact, begin_span
-from rubhpc.kernels.mode_change import EventWork, change_contacts
 from rubhpc.kernels.sampling import Measured, Recorder  # noqa: TC001 - part of a kernel's signature
 
 Floats = NDArray[np.float64]

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.case_progress import NONE
+from rubhpc.kernels.closed_form.event_loop import stand_still
+from rubhpc.kernels.closed_form.mode_change import GAP_TOLERANCE
 from rubhpc.kernels.contact_modes import (
     FORCED_LEVEL,
     bounded,
@@ -17,8 +19,6 @@ from rubhpc.kernels.contact_modes import (
 )
 from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.cubics import turning_value
-from rubhpc.kernels.event_loop import stand_still
-from rubhpc.kernels.mode_change import GAP_TOLERANCE
 
 Floats = NDArray[np.float64]
 

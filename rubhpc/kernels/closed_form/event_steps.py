@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import linked_sum
 from rubhpc.kernels.accumulators import observe_force
 from rubhpc.kernels.case_progress import NONE, Clock, Coordinates, Progress, Sections, shaft_turn
+from rubhpc.kernels.closed_form.measuring import end_span
+from rubhpc.kernels.closed_form.mode_change import GAP_TOLERANCE
 from rubhpc.kernels.contact_modes import (
     FORCED_LEVEL,
     SAMPLES_AT_ONCE,
@@ -23,8 +25,6 @@ from rubhpc.kernels.contact_modes import (
     leave,
 )
 from rubhpc.kernels.coordinate_steps import floor_log2
-from rubhpc.kernels.measuring import end_span
-from rubhpc.kernels.mode_change import GAP_TOLERANCE
 from rubhpc.kernels.sampling import Measured, take_samples
 
 if TYPE_CHECKING:

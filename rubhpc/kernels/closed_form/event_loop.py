@@ -30,16 +30,8 @@ from rubhpc.kernels.case_progress import (
     Progress,
     Sections,
 )
-from rubhpc.kernels.contact_event import begin_mode, take_event
-from rubhpc.kernels.contact_modes import (
-    BOUND_LEVEL,
-    ModeTables,
-    Reduced,
-    dot,
-    event_free_interval,
-    propagate,
-)
-from rubhpc.kernels.event_steps import (
+from rubhpc.kernels.closed_form.contact_event import begin_mode, take_event
+from rubhpc.kernels.closed_form.event_steps import (
     choose_step,
     contact_age,
     end_record,
@@ -48,12 +40,20 @@ from rubhpc.kernels.event_steps import (
     note_section,
     sample_step,
 )
-from rubhpc.kernels.measuring import observe_step, resolved_contact
-from rubhpc.kernels.mode_change import GAP_TOLERANCE
+from rubhpc.kernels.closed_form.measuring import observe_step, resolved_contact
+from rubhpc.kernels.closed_form.mode_change import GAP_TOLERANCE
+from rubhpc.kernels.contact_modes import (
+    BOUND_LEVEL,
+    ModeTables,
+    Reduced,
+    dot,
+    event_free_interval,
+    propagate,
+)
 from rubhpc.kernels.sampling import Measured  # noqa: TC001 - part of a kernel's signature
 
 if TYPE_CHECKING:
-    from rubhpc.kernels.mode_change import EventWork
+    from rubhpc.kernels.closed_form.mode_change import EventWork
 
 Floats = NDArray[np.float64]
 

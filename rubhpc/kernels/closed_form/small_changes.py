@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit_sum, linked_sum
 from rubhpc.kernels._struct import Struct
+from rubhpc.kernels.closed_form.flow import GRADIENT, RATE_BEGUN, RATE_ENDED
+from rubhpc.kernels.closed_form.mode_change import AT_REST, product
+from rubhpc.kernels.closed_form.revolutions import AFTER, PieceModes, PieceRows
 from rubhpc.kernels.contact_modes import Reduced, add_rows, find_mode
 from rubhpc.kernels.coordinate_steps import floor_log2
 from rubhpc.kernels.elimination import eliminate
-from rubhpc.kernels.flow import GRADIENT, RATE_BEGUN, RATE_ENDED
-from rubhpc.kernels.mode_change import AT_REST, product
-from rubhpc.kernels.revolutions import AFTER, PieceModes, PieceRows
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

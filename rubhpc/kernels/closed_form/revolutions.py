@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from rubhpc.kernels._jit import jit_sum
 from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.accumulators import Accumulator  # noqa: TC001 - part of a kernel's signature
+from rubhpc.kernels.closed_form.flow import BEFORE, PieceRoom, PieceTables, Timing, follow_piece
+from rubhpc.kernels.closed_form.mode_change import EventWork, change_contacts
 from rubhpc.kernels.contact_modes import Reduced, find_mode
-from rubhpc.kernels.flow import BEFORE, PieceRoom, PieceTables, Timing, follow_piece
-from rubhpc.kernels.mode_change import EventWork, change_contacts
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

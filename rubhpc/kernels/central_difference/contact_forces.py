@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from rubhpc.kernels._jit import jit, linked
+from rubhpc.kernels.central_difference.coulomb_friction import fill_slip, friction_residual, solve_friction
 from rubhpc.kernels.complementarity import UNSOLVED, natural_residual, solve_complementarity
 from rubhpc.kernels.contact_pairs import (
     N_DEGREE,
@@ -14,7 +15,6 @@ from rubhpc.kernels.contact_pairs import (
     fill_moved,
     pair_normal_and_gap,
 )
-from rubhpc.kernels.coulomb_friction import fill_slip, friction_residual, solve_friction
 from rubhpc.kernels.laws import gap_target, is_bouncing, is_penalty, may_stick, softness
 
 GAP_TOLERANCE = 1e-14  # m, to which a closed gap is zero

@@ -22,8 +22,9 @@ from rubhpc.kernels.accumulators import (
     observe_solution,
     take_sample,
 )
+from rubhpc.kernels.central_difference.contact_forces import solve_contact
+from rubhpc.kernels.central_difference.linear import Linear, circulatory_power, free_velocity, turning_force
 from rubhpc.kernels.complementarity import UNSOLVED
-from rubhpc.kernels.contact_forces import solve_contact
 from rubhpc.kernels.contact_pairs import (
     N_DEGREE,
     Pairs,
@@ -35,7 +36,6 @@ from rubhpc.kernels.contact_pairs import (
     rim_sense,
 )
 from rubhpc.kernels.laws import is_bouncing, is_penalty, is_plain
-from rubhpc.kernels.linear import Linear, circulatory_power, free_velocity, turning_force
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

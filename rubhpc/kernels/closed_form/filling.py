@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from rubhpc.kernels._jit import jit, linked, linked_sum
 from rubhpc.kernels._struct import Struct
+from rubhpc.kernels.closed_form.courses import Courses, follow, follow_rates
+from rubhpc.kernels.closed_form.filling_energies import Losses, fill_energies
+from rubhpc.kernels.closed_form.retuning_exponentials import retune_bounds, retune_outputs, retune_powers
 from rubhpc.kernels.contact_modes import ModeTables  # noqa: TC001 - part of a kernel's signature
-from rubhpc.kernels.courses import Courses, follow, follow_rates
-from rubhpc.kernels.filling_energies import Losses, fill_energies
-from rubhpc.kernels.retuning_exponentials import retune_bounds, retune_outputs, retune_powers
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
