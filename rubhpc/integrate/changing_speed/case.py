@@ -12,7 +12,7 @@ import numpy as np
 from rubhpc.errors import InputError
 from rubhpc.integrate.changing_speed.driven import DrivenRun, integrate_driven
 from rubhpc.integrate.changing_speed.run_up import integrate_run_up
-from rubhpc.integrate.changing_speed.turns import contact_measures
+from rubhpc.integrate.changing_speed.turns import measures_of_turns
 from rubhpc.integrate.compilation import seconds_compiling
 from rubhpc.integrate.measuring.samples import by_name, probe_extents
 from rubhpc.integrate.modal_setup import ModalSetup
@@ -92,7 +92,7 @@ def record_run_up(
     measures: dict[str, Any] = dict.fromkeys(of_stators, none)
     if not found.reason:
         lasts = 2.0 * np.pi / found.speed
-        of_contacts = contact_measures(
+        of_contacts = measures_of_turns(
             found.together,
             found.whole,
             turns,
@@ -101,9 +101,6 @@ def record_run_up(
             is_round=setup.is_updated,
         )
         measures |= of_contacts | {
-            "contact_fraction": lasts @ found.contact_fraction / lasts.sum(),
-            "peak_contact_force": found.peak_contact_force.max(axis=0),
-            "friction_work": found.friction_work.mean(axis=0),
             "peak_torsion": float(np.abs(signals["torsion"]).max()),
             "peak_to_peak_vertical": float(np.ptp(signals["vertical"])),
             "peak_to_peak_horizontal": float(np.ptp(signals["horizontal"])),

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rubhpc.integrate.measuring.measures import contact_measures
 from rubhpc.integrate.measuring.monitors import carrier_displacement, monitored
 from rubhpc.integrate.measuring.rub_in_bores import rub_measures
 from rubhpc.integrate.measuring.samples import empty_samples, new_accumulator
@@ -69,7 +70,7 @@ class Turns:
             extreme(total, extreme.reduce(new[name]), out=total)
 
 
-def contact_measures(
+def measures_of_turns(
     together: Accumulator, whole: Floats, n_revolution: int, model: Model, *, duration: float, is_round: bool
 ) -> dict[str, Any]:
     """Measures of the contacts of a whole record, as at constant speed (`measures_of`).
@@ -77,20 +78,10 @@ def contact_measures(
     `together` is the accumulator of all revolutions, `whole` their samples (`Samples.whole`), `duration`
     their time, s, and `is_round` whether the gap includes the roundness of the rim.
     """
-    has_touched = together.impulse > 0.0
     samples = empty_samples(model.n_place, whole.shape[1], model.n_probe, model.n_push)
     samples.whole[:] = whole
-    none = np.zeros(len(model.stators))
     return {
-        "contacts_per_revolution": together.n_contact / n_revolution,
-        "contact_duration": np.where(
-            has_touched, together.contact_time / np.maximum(together.n_contact, 1), 0.0
-        ),
-        "contact_impulse": together.impulse / n_revolution,
-        "stick_fraction": np.divide(
-            together.stick_time, together.contact_time, out=none, where=together.contact_time > 0.0
-        ),
-        "minimum_slip_speed": np.where(np.isfinite(together.least_slip), together.least_slip, np.nan),
+        **contact_measures(together, n_revolution, duration),
         "carrier_displacement": carrier_displacement(samples, model),
         **rub_measures(samples.push, together, duration, model),
     } | monitored(samples, together, model, is_round=is_round)

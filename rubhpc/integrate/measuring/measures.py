@@ -61,9 +61,7 @@ def measures_of(
     n_sample = signals["vertical"].size
     n_revolution = n_sample // samples_per_revolution
     duration = 2.0 * np.pi * n_revolution / abs(spin)
-    has_touched = accumulator.impulse > 0
-    is_contact = bool(has_touched.any())
-    n_contact = np.maximum(accumulator.n_contact, 1)  # a permanent contact does not begin in the record
+    is_contact = bool((accumulator.impulse > 0.0).any())
     orbit = signals["vertical"], signals["horizontal"], samples_per_revolution
     verdict = judge(*orbit, is_contact)
     multiplier = verdict.multiplier
@@ -85,20 +83,7 @@ def measures_of(
         "largest_multiplier": math.nan if cmath.isnan(multiplier) else abs(multiplier),
         "multiplier_angle": cmath.phase(multiplier),
         "whirl_ratio": whirl_ratio(*orbit, spin),
-        "contact_fraction": accumulator.contact_time / duration,
-        "stick_fraction": np.divide(
-            accumulator.stick_time,
-            accumulator.contact_time,
-            out=np.zeros(len(model.stators)),
-            where=accumulator.contact_time > 0.0,
-        ),
-        "reversals_per_revolution": accumulator.reversals / n_revolution,
-        "contacts_per_revolution": accumulator.n_contact / n_revolution,
-        "contact_duration": np.where(has_touched, accumulator.contact_time / n_contact, 0.0),
-        "peak_contact_force": accumulator.peak_force,
-        "contact_impulse": accumulator.impulse / n_revolution,
-        "friction_work": accumulator.friction_work / n_revolution,
-        "minimum_slip_speed": np.where(np.isfinite(accumulator.least_slip), accumulator.least_slip, np.nan),
+        **contact_measures(accumulator, n_revolution, duration),
         "peak_torsion": float(max(accumulator.highest[TWIST], -accumulator.lowest[TWIST])),
         "peak_to_peak_vertical": float(accumulator.highest[VERTICAL] - accumulator.lowest[VERTICAL]),
         "peak_to_peak_horizontal": float(accumulator.highest[HORIZONTAL] - accumulator.lowest[HORIZONTAL]),
@@ -106,6 +91,23 @@ def measures_of(
         "settled": _settled(verdict, signals, model, spin, samples_per_revolution, is_contact),
         "contact_iterations": int(accumulator.pivots[0]),
         "contact_residual": float(np.divide(distance, moved, out=np.zeros(3), where=moved > 0.0).max()),
+    }
+
+
+def contact_measures(accumulator: Accumulator, n_revolution: int, duration: float) -> dict[str, Floats]:
+    """Measures (q,) of the contacts of a record of so many revolutions and its duration, s."""
+    n_contact = np.maximum(accumulator.n_contact, 1)  # a permanent contact does not begin in the record
+    has_touched, time = accumulator.impulse > 0.0, accumulator.contact_time
+    return {
+        "contact_fraction": time / duration,
+        "stick_fraction": np.divide(accumulator.stick_time, time, out=np.zeros(time.size), where=time > 0.0),
+        "reversals_per_revolution": accumulator.reversals / n_revolution,
+        "contacts_per_revolution": accumulator.n_contact / n_revolution,
+        "contact_duration": np.where(has_touched, time / n_contact, 0.0),
+        "peak_contact_force": accumulator.peak_force,
+        "contact_impulse": accumulator.impulse / n_revolution,
+        "friction_work": accumulator.friction_work / n_revolution,
+        "minimum_slip_speed": np.where(np.isfinite(accumulator.least_slip), accumulator.least_slip, np.nan),
     }
 
 

@@ -56,6 +56,7 @@ def new_accumulator(n_stator: int, n_place: int | None = None) -> Accumulator:
         n_stator if n_place is None else n_place,
         force_piece=np.zeros((n_stator, LOUD + 1, MOST_PIECES)),
         force_held=np.zeros((n_stator, 2), dtype=np.int64),
+        sense=np.zeros(n_stator, dtype=np.int64),
         origin=np.zeros(1),
     )
 
@@ -69,7 +70,7 @@ def no_record(n_place: int, n_stator: int) -> tuple[Samples, Accumulator]:
 def following_accumulator(before: Accumulator, passed: float) -> Accumulator:
     """Accumulator of a march that restarts its time, after `passed` (s) of the march before.
 
-    Means of the contact force include times before the restart.
+    Means of the contact force, and reversals of the slip, include times before the restart.
     """
     pieces = before.force_piece.copy()
     pieces[:, LOUD, 0] = np.inf  # relative to a peak that is reset
@@ -78,14 +79,15 @@ def following_accumulator(before: Accumulator, passed: float) -> Accumulator:
         before.peak_lateral.size,
         force_piece=pieces,
         force_held=before.force_held.copy(),
+        sense=before.sense.copy(),
         origin=before.origin + passed,
     )
 
 
 def _accumulator(n_stator: int, n_place: int, **window: Any) -> Accumulator:
-    """Zero accumulator except for the window of the mean force; a run-up makes one per revolution."""
+    """Zero accumulator but for the window of the mean force and the sense of slip; run-ups make many."""
     contact_time, impulse, stick_time, friction_work, peak_force, least_slip, turned = np.zeros((7, n_stator))
-    n_contact, sense, reversals = np.zeros((3, n_stator), dtype=np.int64)
+    n_contact, reversals = np.zeros((2, n_stator), dtype=np.int64)
     highest, lowest = _WIDEST.copy()
     least_slip[:] = np.inf
     return Accumulator(
@@ -96,7 +98,6 @@ def _accumulator(n_stator: int, n_place: int, **window: Any) -> Accumulator:
         contact_time=contact_time,
         impulse=impulse,
         stick_time=stick_time,
-        sense=sense,
         reversals=reversals,
         friction_work=friction_work,
         least_slip=least_slip,

@@ -13,7 +13,7 @@ from closed_form import run_up
 from set_ups import prepared
 from trial_rig import STEEL
 
-from rubhpc import LumpedStator, Probe, Rig, Unbalance
+from rubhpc import LumpedStator, Probe, Rig, Unbalance, read_rig
 from rubhpc.fem.assemble import assemble, model_at
 from rubhpc.fem.probes import with_probes
 from rubhpc.integrate.case import run_case
@@ -227,6 +227,20 @@ def test_pairs_that_part_are_not_struck_again():
     passage, steady = record_run_up(setup, law, **case), run_case(setup, **case)
     assert passage.measures["contact_fraction"].sum() > 1.0
     assert passage.measures["steps"] < 1.1 * steady.measures["steps"]
+
+
+def test_reversals_are_counted_as_at_constant_speed():
+    """Three stators at 200 rad/s: the rim slips backwards several times a revolution, also between pieces."""
+    law = SpeedLaw(time=(0.0, 1.0), speed=(200.0, 200.4))
+    recording = Recording(transient=0, revolutions=law.n_revolution, samples_per_revolution=PER_REVOLUTION)
+    rig = read_rig("mokhtar2017").with_geometry("linear")
+    three = replace(rig, stator=(replace(rig.stator[0], count=3),))
+    setup = prepared(three, 200.4, samples=PER_REVOLUTION, friction_law="coulomb")
+    case = {"recording": recording, "initial": Initial(), "clearance": 60e-6, "friction": 0.3}
+    passage, steady = record_run_up(setup, law, **case).measures, run_case(setup, **case).measures
+    for name in ("reversals_per_revolution", "contacts_per_revolution", "stick_fraction"):
+        assert passage[name] == pytest.approx(steady[name], rel=0.1), name
+    assert steady["reversals_per_revolution"].min() > 3.0
 
 
 EVEN_STEP = 2e-6  # s
