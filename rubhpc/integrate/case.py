@@ -15,11 +15,11 @@ from rubhpc.integrate.carried_tangent import CarriedTangent
 from rubhpc.integrate.compilation import COLLOCATION, COMMON, PERIODIC, seconds_compiling
 from rubhpc.integrate.lyapunov import Growth, Marches
 from rubhpc.integrate.marched_record import march_record
+from rubhpc.integrate.marches.case_modes import NoClosedForm
 from rubhpc.integrate.marches.central_difference import CentralDifferenceMarch
 from rubhpc.integrate.marches.collocation import CollocationMarch
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.marches.march import ended_in
-from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.measuring.divergence import diverged_record
 from rubhpc.integrate.measuring.measures import measures_of
 from rubhpc.integrate.measuring.monitors import carrier_displacement, monitored

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rubhpc.errors import InputError, NoPeriodicMotion
 from rubhpc.integrate.case import MARCHES, run_case
-from rubhpc.integrate.marches.met_modes import NoClosedForm
+from rubhpc.integrate.marches.case_modes import NoClosedForm
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.periodic_motions.collocated_motion import followed_motion
 from rubhpc.integrate.periodic_motions.revolution import least_of

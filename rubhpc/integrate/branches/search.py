@@ -14,7 +14,7 @@ from rubhpc.integrate.branches.arclength import Track, follow
 from rubhpc.integrate.branches.events import NARROW, Event, half_change, has_halved, kind_of
 from rubhpc.integrate.branches.grazing import distances, passed
 from rubhpc.integrate.branches.point import REAL
-from rubhpc.integrate.marches.met_modes import NoClosedForm
+from rubhpc.integrate.marches.case_modes import NoClosedForm
 from rubhpc.integrate.periodic_motions.collocated_motion import followed_motion
 from rubhpc.integrate.periodic_motions.piecewise_motion import Unfollowed
 from rubhpc.integrate.periodic_motions.shooting import NotConverged

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rubhpc.integrate.changing_speed.passing import Passed, Passing, state_at
+from rubhpc.integrate.changing_speed.piece_integrator import PieceIntegrator, PieceResult, state_at
 from rubhpc.integrate.changing_speed.pieces import Pieces
 from rubhpc.integrate.changing_speed.twist_ramp import TwistRamp, sag_ramp
 from rubhpc.integrate.measuring.samples import lift_samples, new_accumulator
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rubhpc.integrate.changing_speed.passing import Ended
+    from rubhpc.integrate.changing_speed.piece_integrator import PieceEnd
     from rubhpc.integrate.changing_speed.piece_setup import PieceSetup
     from rubhpc.integrate.marches.modal import Place
     from rubhpc.integrate.modal_setup import ModalSetup
@@ -50,10 +50,10 @@ STEEP, STEEPEST = 1.1, 2.5
 MOST_TRIES = 4  # tries of a piece before it is halved
 
 
-class Taken(NamedTuple):
+class DrivenPiece(NamedTuple):
     """A finished piece."""
 
-    passed: Passed
+    passed: PieceResult
     lag: float  # rad, as of `speed_law.LAG`
     swing: float  # change of the speed, over the sum of the first and the last one
     times: list[float]  # s, at its beginning and at the ends of the revolutions, or of the part, in it
@@ -78,7 +78,7 @@ class Spin:
         assert fastest.free_spin is not None
         model = fastest.model
         self._drive, self._initial, self._clearance = drive, initial, clearance
-        self._pieces, self._passing = Pieces(fastest), Passing(clearance, friction, check, say)
+        self._pieces, self._integrator = Pieces(fastest), PieceIntegrator(clearance, friction, check, say)
         self._free = fastest.free_spin
         self._gyroscopic = model.rotor.gyroscopic
         self._phasor = model.unbalance_cosine - 1j * model.unbalance_sine
@@ -88,7 +88,7 @@ class Spin:
         self._twisting = drive.at(drive.start)
         self._begun: State | Place | None = None
         self._setup: PieceSetup | None = None  # of the last piece
-        self._ended: Ended | None = None  # where it has ended
+        self._ended: PieceEnd | None = None  # where it has ended
         # The contact forces of the piece before, and how long it took, s.
         self._earlier = new_accumulator(len(model.stators), model.n_place), 0.0
 
@@ -100,7 +100,7 @@ class Spin:
             self._setup = self._pieces.setup(*at, self._drive.slope(self.speed))
             self._begun = self._start(self._setup)
         self._begun = self.state
-        self._pieces, self._passing, self._ended = Pieces(fastest), self._passing.anew(), None
+        self._pieces, self._integrator, self._ended = Pieces(fastest), self._integrator.anew(), None
 
     @property
     def state(self) -> State:
@@ -109,7 +109,7 @@ class Spin:
         assert self._setup is not None
         return state_at(self._begun, self._setup)
 
-    def take(self, at: int, length: int, per_revolution: int, *, is_fixed: bool) -> Taken | None:
+    def take(self, at: int, length: int, per_revolution: int, *, is_fixed: bool) -> DrivenPiece | None:
         """Integrate a piece from sample `at`; None where it is too long, or the spin does not reach its end.
 
         `is_fixed`: it is not shortened for accuracy. A piece with an odd number of samples is not either,
@@ -143,20 +143,22 @@ class Spin:
             middle = 0.5 * (low + high)
             slope = drive.slope(mean)
             setup = self._setup = self._pieces.setup(mean, acceleration, first, duration, middle, slope)
-            ramp = TwistRamp(*(share * (high - low) * setup.held.twist for share in (0.5, 1.0 / duration)))
-            if setup.held.sagging_models and self._is_open(setup):
-                ramp = ramp.with_sag(
-                    sag_ramp(setup.held, acceleration, self.speed, end_speed, duration), setup
-                )
+            of_range = setup.matrices
+            ramp = TwistRamp(*(share * (high - low) * of_range.twist for share in (0.5, 1.0 / duration)))
+            if of_range.sagging_models and self._is_open(setup):
+                sag = sag_ramp(of_range, acceleration, self.speed, end_speed, duration)
+                ramp = ramp.with_sag(sag, setup)
             if self._begun is None:
                 start = self._start(setup)
                 self._begun = start if start is self._initial else ramp.of_rotor(start, setup)
             reached = ramp.about_middle(self._begun, setup)
             before = self._ended
-            self._passing.left = before.left if before else None
-            goes_on = before is not None and before.setup.held is setup.held and setup.held.is_followed
-            goes_on = goes_on or self._passing.goes_over(setup, reached, before)
-            passed = self._passing.take(
+            self._integrator.left = before.left if before else None
+            is_same = before is not None and before.setup.matrices is of_range
+            goes_on = (is_same and of_range.is_interpolated) or self._integrator.goes_over(
+                setup, reached, before
+            )
+            passed = self._integrator.take(
                 setup, length, reached, self._earlier, is_balanced=True, goes_on=goes_on
             )
             lift_samples(passed.whole, setup.model)
@@ -206,7 +208,7 @@ class Spin:
         self.speed += change
         if not self.speed > 0.0:
             return None
-        self._ended = self._passing.ended(setup, length, acceleration)
+        self._ended = self._integrator.ended(setup, length, acceleration)
         self.time += duration
         last_turn.note_torque(at, length, torque - inertia * change / duration)
         self._twisting = high
@@ -223,11 +225,11 @@ class Spin:
 
     def _is_open(self, setup: PieceSetup) -> bool:
         """Whether nothing touches as a piece begins, about the sag of its middle too."""
-        return self._begun is not None and self._passing.is_open(self._begun, setup)
+        return self._begun is not None and self._integrator.is_open(self._begun, setup)
 
     def _taken(
         self,
-        passed: Passed,
+        passed: PieceResult,
         acceleration: float,
         change: float,
         length: int,
@@ -235,7 +237,7 @@ class Spin:
         torque: float,
         energies: Floats,
         rubbed: float,
-    ) -> Taken:
+    ) -> DrivenPiece:
         """Result of a piece, revolution by revolution.
 
         Its times follow from the guessed acceleration (rad/s^2), braking from the change of the speed (rad/s)
@@ -255,7 +257,7 @@ class Spin:
         duration = sum(lasts)
         lag = max(abs(acceleration), rubbed) * duration**2 / 12.0
         swing = (speeds[-1] - speeds[0]) / (speeds[-1] + speeds[0])
-        return Taken(passed, lag, swing, times, work, braking, energies)
+        return DrivenPiece(passed, lag, swing, times, work, braking, energies)
 
     def _change(self, given: float, before: float, after: float) -> float:
         """Change of the speed, rad/s, by the energy given to the spin, J; NaN where it would reverse.

@@ -180,7 +180,7 @@ def constant_course(node: Node, phasor: Complexes, *, n_ahead: int) -> ModeCours
     )
 
 
-def followed(course: ModeCourse, nodes: Sequence[Node], entered: Entries) -> ModeCourse:
+def interpolated(course: ModeCourse, nodes: Sequence[Node], entered: Entries) -> ModeCourse:
     """The same mode with what of it goes with the speed.
 
     `nodes` are those at `NODES`, the middle first; `entered` is what enters them (`entries`).

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 D = TypeVar("D")
 
 
-class HeldMatrices:
+class RangeMatrices:
     """Matrices at a speed, rad/s, and an acceleration, rad/s^2, with their solved contact modes.
 
     `momentum` (n, n) is the change of the stiffness with the acceleration, per rad/s^2. `beside` are the
@@ -94,7 +94,7 @@ class HeldMatrices:
         return self._reach[0]
 
     @property
-    def is_followed(self) -> bool:
+    def is_interpolated(self) -> bool:
         """Whether they follow the speed."""
         return bool(self._beside)
 
@@ -169,7 +169,7 @@ class HeldMatrices:
 class PieceSetup(ModalSetup):
     """A set-up at the speed of a piece, whose matrices are shared with other pieces."""
 
-    held: HeldMatrices
+    matrices: RangeMatrices
     speeds: Speeds  # of this piece and of others that have the same matrices
     place: int  # of this piece among them
     most_energy: float  # J, beyond which the motion has diverged, at the highest speed
@@ -182,7 +182,7 @@ class PieceSetup(ModalSetup):
     @cached_property
     def sample_level(self) -> int:
         """Samples are 2^sample_level ticks apart, at all speeds of the same matrices."""
-        return self.held.sample_level
+        return self.matrices.sample_level
 
     @property
     def within(self) -> float:
@@ -192,20 +192,24 @@ class PieceSetup(ModalSetup):
     @property
     def has_energies(self) -> bool:
         """Whether energies are requested."""
-        return self.held.is_balanced
+        return self.matrices.is_balanced
 
     @property
     def local_motions(self) -> Floats:
         """Local motions of each pair, at all speeds of the same range."""
-        return self.held.local_motions
+        return self.matrices.local_motions
 
     def goes_on_in(self, other: PieceSetup, acceleration: float, next_acceleration: float) -> bool:
         """Whether the next piece has matrices of the same range that follow the speed."""
-        return other.held is self.held and self.held.is_followed and next_acceleration == acceleration
+        return (
+            other.matrices is self.matrices
+            and self.matrices.is_interpolated
+            and next_acceleration == acceleration
+        )
 
     def bodies(self, friction: float, clearance: Floats) -> Reduced:
         """The reduced bodies of a case for kernels; clearance (q,), m."""
-        known = self.held.bodies
+        known = self.matrices.bodies
         made = known.get(friction)
         if made is None:
             of_range = super().bodies(friction, clearance)
@@ -225,7 +229,7 @@ class PieceSetup(ModalSetup):
 
     def _overlap(self, made: Reduced, clearance: Floats) -> float:
         """Overlap, m, that modes which follow the speed may leave as a pair opens, without an event."""
-        if not self.held.is_followed:
+        if not self.matrices.is_interpolated:
             return made.overlap
         return max(made.overlap, float(self.accuracy * np.abs(clearance[: len(self.model.stators)]).min()))
 
@@ -238,7 +242,7 @@ class PieceSetup(ModalSetup):
         return found
 
     def _solve_flight(self) -> FlightModes:
-        library = self.held.tuned(self, 0.0)
+        library = self.matrices.tuned(self, 0.0)
         modes = library.eigenmodes(0, min(max(self.within, -1.0), 1.0))
         assert modes is not None
         turning, factor = complex(self.clock.growth, self.spin), complex(self.speeds.factor[self.place])
@@ -256,7 +260,7 @@ class PieceSetup(ModalSetup):
 
     def library(self, friction: float) -> ModeLibrary:
         """Contact modes of a friction, tuned to the piece."""
-        return self.held.tuned(self, friction)
+        return self.matrices.tuned(self, friction)
 
 
 def with_values(instance: D, **values: Any) -> D:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.changing_speed.piece_setup import HeldMatrices, PieceSetup
+    from rubhpc.integrate.changing_speed.piece_setup import PieceSetup, RangeMatrices
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.kernels.closed_form.filling import Speeds
 
@@ -29,13 +29,13 @@ if TYPE_CHECKING:
 
 AT_ONCE, SAGGING_AT_ONCE = 16, 8  # pieces set up together; where their sag, one for all, follows the speed
 LEAST_GROWTH = 1e-5  # of the unbalance force in a piece
-MOST_HELD = 4  # matrices at hand, of a spin that swings between them
+MOST_AT_HAND = 4  # matrices at hand, of a spin that swings between them
 MOST_BYTES = 3 * 2**29  # of contact modes that are kept, with their matrices, for other cases
 MOST_DRIVEN_BYTES = 2**27  # the same of a free spin, whose cases have few speeds in common
 
 # Of each set-up, the matrices by speed, acceleration, slope of the torque and the range before, the latest
 # last, for other cases too.
-_KNOWN: WeakKeyDictionary[ModalSetup, dict[tuple[object, ...], HeldMatrices]] = WeakKeyDictionary()
+_KNOWN: WeakKeyDictionary[ModalSetup, dict[tuple[object, ...], RangeMatrices]] = WeakKeyDictionary()
 
 _RIPPLES: WeakKeyDictionary[ModalSetup, Ripples] = WeakKeyDictionary()
 
@@ -45,7 +45,7 @@ class Block:
 
     Parameters
     ----------
-    held : HeldMatrices
+    matrices : RangeMatrices
     model : Model
         About the sag that they share.
     speeds : Speeds
@@ -60,14 +60,14 @@ class Block:
 
     def __init__(
         self,
-        held: HeldMatrices,
+        matrices: RangeMatrices,
         model: Model,
         speeds: Speeds,
         force: Floats,
         search_level: Ints,
         interval: Floats,
     ) -> None:
-        self.held, self.model, self.speeds = held, model, speeds
+        self.matrices, self.model, self.speeds = matrices, model, speeds
         self.force, self.search_level, self.interval = force, search_level, interval
         self._made: dict[int, PieceSetup] = {}
 
@@ -86,10 +86,10 @@ class Block:
         return self[len(self) - 1]
 
     def _make(self, place: int) -> PieceSetup:
-        held, speeds, template = self.held, self.speeds, self.held.template
+        matrices, speeds, template = self.matrices, self.speeds, self.matrices.template
         spin, tick = float(speeds.spin[place]), float(speeds.tick[place])
         search, growth = int(self.search_level[place]), float(speeds.growth[place])
-        at_place = held.at_place(float(speeds.within[place]))
+        at_place = matrices.at_place(float(speeds.within[place]))
         return with_values(
             template,
             model=self.model,
@@ -109,7 +109,7 @@ class Pieces:
     def __init__(self, fastest: ModalSetup) -> None:
         self._fastest = fastest
         self._ranges = SpeedRanges(fastest)
-        self._held: list[HeldMatrices] = []  # the latest first
+        self._at_hand: list[RangeMatrices] = []  # the latest first
         self._used: set[tuple[object, ...]] = set()  # those of `_KNOWN` that this case has used
 
     @property
@@ -133,9 +133,9 @@ class Pieces:
 
         `torque` (N m) is that of the drive of a free spin, `slope` (N m s) its change with the speed.
         """
-        held = self._find(speed, acceleration, slope)
+        matrices = self._find(speed, acceleration, slope)
         columns = np.array([[speed], [acceleration], [angle], [duration]])
-        return self._in_held(held, columns, torque)[0]
+        return self._in_range(matrices, columns, torque)[0]
 
     def blocks(
         self, speed: Floats, acceleration: Floats, angle: Floats, duration: Floats, n_sample: Ints
@@ -146,30 +146,30 @@ class Pieces:
         """
         first = 0
         while first < speed.size:
-            held, last = self._find(float(speed[first]), float(acceleration[first])), first + 1
-            at_once = SAGGING_AT_ONCE if held.sagging_models else AT_ONCE
+            matrices, last = self._find(float(speed[first]), float(acceleration[first])), first + 1
+            at_once = SAGGING_AT_ONCE if matrices.sagging_models else AT_ONCE
             while (
                 last < min(speed.size, first + at_once)
                 and n_sample[last] == n_sample[first]
                 and acceleration[last] == acceleration[first]
-                and held.serve(speed[last], acceleration[last])
+                and matrices.serve(speed[last], acceleration[last])
             ):
                 last += 1
             columns = np.stack([speed, acceleration, angle, duration])[:, first:last]
-            yield self._in_held(held, columns)
+            yield self._in_range(matrices, columns)
             first = last
 
-    def _in_held(self, held: HeldMatrices, columns: Floats, torque: float = 0.0) -> Block:
+    def _in_range(self, matrices: RangeMatrices, columns: Floats, torque: float = 0.0) -> Block:
         """The set-ups of pieces that all have the same matrices; columns as the arguments of `setup`.
 
         Their sag is that of the first acceleration and of the mean speed.
         """
         speed, acceleration, angle, duration = columns
         asked = (torque, *columns.ravel().tolist())
-        if angle[0] == 0.0 and held.first is not None and held.first[0] == asked:
-            assert isinstance(held.first[1], Block)
-            return held.first[1]
-        model = held.sagging(torque, float(acceleration[0]), float(speed.mean()))
+        if angle[0] == 0.0 and matrices.first is not None and matrices.first[0] == asked:
+            assert isinstance(matrices.first[1], Block)
+            return matrices.first[1]
+        model = matrices.sagging(torque, float(acceleration[0]), float(speed.mean()))
         lag = acceleration * duration**2 / 12.0
         growth = growth_of(speed, acceleration, duration)
         begins = np.exp(1j * (angle - lag) - 0.5 * growth * duration)
@@ -177,44 +177,44 @@ class Pieces:
         phasor = factor[:, np.newaxis] * self._ranges.phasor
         force = np.stack([phasor.real, -phasor.imag], axis=1)
         interval = 2.0 * math.pi / (np.abs(speed) * self._fastest.samples_per_revolution)
-        tick = interval / (1 << held.sample_level)
-        at_middle = held.reduced.spin, held.sample_level, held.reach
+        tick = interval / (1 << matrices.sample_level)
+        at_middle = matrices.reduced.spin, matrices.sample_level, matrices.reach
         speeds = speeds_of(speed, factor, growth, tick, *at_middle)
-        longest = np.floor(np.log2(held.template.step / tick)).astype(int)
-        search_level = np.clip(longest, 0, held.sample_level)
-        found = Block(held, model, speeds, force, search_level, interval)
+        longest = np.floor(np.log2(matrices.template.step / tick)).astype(int)
+        search_level = np.clip(longest, 0, matrices.sample_level)
+        found = Block(matrices, model, speeds, force, search_level, interval)
         if angle[0] == 0.0:
-            held.first = asked, found
+            matrices.first = asked, found
         return found
 
-    def _find(self, speed: float, acceleration: float, slope: float = 0.0) -> HeldMatrices:
+    def _find(self, speed: float, acceleration: float, slope: float = 0.0) -> RangeMatrices:
         """Matrices that may be held at a speed and an acceleration."""
-        for i, held in enumerate(self._held):
-            if held.serve(speed, acceleration, slope):
+        for i, matrices in enumerate(self._at_hand):
+            if matrices.serve(speed, acceleration, slope):
                 if i:
-                    self._held.insert(0, self._held.pop(i))
-                return held
+                    self._at_hand.insert(0, self._at_hand.pop(i))
+                return matrices
         known = _KNOWN.setdefault(self._fastest, {})
-        guess = self._held[0].reach if self._held else None
+        guess = self._at_hand[0].reach if self._at_hand else None
         asked = speed, acceleration, slope, guess
         found = known.pop(asked, None) or self._ranges.hold(speed, acceleration, slope, guess)
         if self._make_room(known):
             known[asked] = found
             self._used.add(asked)
-        self._held.insert(0, found)
-        for left in self._held[MOST_HELD:]:
+        self._at_hand.insert(0, found)
+        for left in self._at_hand[MOST_AT_HAND:]:
             if left not in known.values():
                 left.forget()
-        del self._held[MOST_HELD:]
+        del self._at_hand[MOST_AT_HAND:]
         return found
 
-    def _make_room(self, known: dict[tuple[object, ...], HeldMatrices]) -> bool:
+    def _make_room(self, known: dict[tuple[object, ...], RangeMatrices]) -> bool:
         """Forget matrices that this case has not used, the earliest first; whether more may be kept.
 
         The next case begins with those that this one has used first.
         """
         most = MOST_BYTES if self._fastest.free_spin is None else MOST_DRIVEN_BYTES
-        n_byte = sum(held.n_byte for held in known.values())
+        n_byte = sum(matrices.n_byte for matrices in known.values())
         for key in [key for key in known if key not in self._used]:
             if n_byte <= most:
                 break

@@ -19,7 +19,7 @@ from rubhpc.integrate.changing_speed.mode_courses import (
     Node,
     constant_course,
     entries,
-    followed,
+    interpolated,
     matched,
 )
 from rubhpc.integrate.reduced_model.mode_library import ModeLibrary
@@ -95,11 +95,11 @@ def speeds_of(
     factor: ArrayLike,
     growth: ArrayLike,
     tick: ArrayLike,
-    held_spin: float,
+    middle_spin: float,
     sample_level: int,
     reach: float = math.inf,
 ) -> Speeds:
-    """Speeds (rad/s) to which tables are filled whose matrices are those at `held_spin`, or within `reach`.
+    """Speeds (rad/s) to which tables are filled whose matrices are those at `middle_spin`, or within `reach`.
 
     `factor` (1/s^2) is what the unbalance at unit speed acts by, which grows by `growth` (1/s), `tick` (s)
     the resolution of events.
@@ -109,7 +109,7 @@ def speeds_of(
     grown = np.asarray(growth, dtype=np.float64)
     return Speeds(
         spin=spins,
-        within=(spins - held_spin) / reach,
+        within=(spins - middle_spin) / reach,
         factor=factors,
         growth=grown,
         tick=ticks,
@@ -144,7 +144,7 @@ class RangeLibrary(ModeLibrary):
         none where matrices stay what they are.
     at_place : callable, optional
         The same at a place in the range, from -1 to 1: for modes that cannot be
-        followed, which are solved at each piece.
+        interpolated, which are solved at each piece.
     is_balanced : bool
         Whether energies are asked for.
     buffers : dict, optional
@@ -181,11 +181,11 @@ class RangeLibrary(ModeLibrary):
         self._among = open_bodies(reduced, model, self._opened)
         self._first_modes()
         self.first_masks = [0]  # a piece begins with no other mode
-        self._is_followed = bool(beside)
+        self._is_interpolated = bool(beside)
         self._beside = [self._with(other) for other in beside]
         self._exponents = {}
-        self._held: dict[int, tuple[ModeTables, ModeCourse]] = {}  # by the set of closed pairs
-        self._strange: set[int] = set()  # modes that cannot be followed
+        self._solved_modes: dict[int, tuple[ModeTables, ModeCourse]] = {}  # by the set of closed pairs
+        self._not_interpolable: set[int] = set()  # modes that change too much between speeds
         self._counted: tuple[tuple[int, ...], int] = (), 0  # modes, and their memory, bytes
         kind: tuple[object, ...] = type(self), self.width, n_level, is_balanced
         buffer = TableBuffer(TableStack(1 + len(self.gap_jacobian)))
@@ -202,8 +202,8 @@ class RangeLibrary(ModeLibrary):
     @property
     def n_byte(self) -> int:
         """Memory that its contact modes hold."""
-        if self._counted[0] != (masks := tuple(self._held)):
-            fields = (field for kept in self._held.values() for part in kept for field in part)
+        if self._counted[0] != (masks := tuple(self._solved_modes)):
+            fields = (field for kept in self._solved_modes.values() for part in kept for field in part)
             sizes = {
                 id(field): field.nbytes
                 for field in fields
@@ -220,11 +220,11 @@ class RangeLibrary(ModeLibrary):
     @property
     def is_full(self) -> bool:
         """Whether there is no room for another contact mode."""
-        return len(self._held) >= self.n_most
+        return len(self._solved_modes) >= self.n_most
 
-    def follows(self, mask: int) -> bool:
+    def interpolates(self, mask: int) -> bool:
         """Whether a mode follows the speed, in coordinates that go on from piece to piece."""
-        return self._is_followed and mask not in self._strange
+        return self._is_interpolated and mask not in self._not_interpolable
 
     def unmet(self, met: set[int]) -> list[int]:
         """None: each piece begins with no mode."""
@@ -243,28 +243,28 @@ class RangeLibrary(ModeLibrary):
             return False
         if mask not in self._place:
             self._place[mask] = len(self.masks)
-            self._tables.add(self._held[mask][0])
+            self._tables.add(self._solved_modes[mask][0])
             self.masks.append(NOT_FILLED)
         place, at = self._place[mask], self._at
         if self.masks[place] != mask:
-            if mask in self._strange:
+            if mask in self._not_interpolable:
                 self._solve_at(mask, place, float(self._speeds.within[at]))
-            fill(self.tables(), place, self._held[mask][1], self._speeds, at)
+            fill(self.tables(), place, self._solved_modes[mask][1], self._speeds, at)
         self.masks[place] = self.tables().mask[place] = mask
         return True
 
     def eigenmodes(self, mask: int, within: float) -> Eigenmodes | None:
         """Those of a set of closed pairs at a place in the range, from -1 to 1; None where it has no room."""
-        if mask not in self._held and self.is_full:
+        if mask not in self._solved_modes and self.is_full:
             self.forget()
-        if not self._has(mask) or mask in self._strange:
+        if not self._has(mask) or mask in self._not_interpolable:
             return None
-        return Eigenmodes.of(*self._held[mask], within)
+        return Eigenmodes.of(*self._solved_modes[mask], within)
 
     def forget(self) -> None:
         """Make room: keep no mode but that with every pair open."""
         self._exponents.clear()
-        self._held.clear()
+        self._solved_modes.clear()
         if self._buffer.user is self:
             self._buffer.user = None
             self._take_buffer()
@@ -280,7 +280,7 @@ class RangeLibrary(ModeLibrary):
 
     def _has(self, mask: int) -> bool:
         """Whether it has the mode with these pairs closed; one met for the first time is solved."""
-        if mask not in self._held:
+        if mask not in self._solved_modes:
             mode = self._solved(mask)
             if mode.exponent.size > self.width:
                 return False
@@ -295,17 +295,18 @@ class RangeLibrary(ModeLibrary):
             found = [matched(mode, library._solved(mode.mask)) for library in self._beside]
             nodes = [middle, *(lib._node(one) for lib, one in zip(self._beside, found, strict=True) if one)]
             if len(nodes) > len(found) and (entered := entries(nodes)).lost <= MOST_LOST:
-                course = followed(course, nodes, entered)
+                course = interpolated(course, nodes, entered)
             if not course.courses.kept.size:
-                self._strange.add(mode.mask)
-        self._held[mode.mask] = without_filled(middle.row, len(self._output)), course
+                self._not_interpolable.add(mode.mask)
+        self._solved_modes[mode.mask] = without_filled(middle.row, len(self._output)), course
 
     def _solve_at(self, mask: int, place: int, within: float) -> None:
-        """Solve a mode that cannot be followed at a place in the range, and put it into the buffer."""
+        """Solve a mode that cannot be interpolated at a place in the range, and put it into the buffer."""
         assert self._at_place is not None
         library = self._with(self._at_place(within))
         node = library._node(library._solved(mask))
-        row, _ = self._held[mask] = without_filled(node.row, len(self._output)), library._constant(node)
+        row = without_filled(node.row, len(self._output))
+        self._solved_modes[mask] = row, library._constant(node)
         for field, new in zip(self.tables(), row, strict=True):
             field[place] = new[0]
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rubhpc.fem.free_spin import unit_rotation
-from rubhpc.integrate.changing_speed.passing import Passing, state_at
+from rubhpc.integrate.changing_speed.piece_integrator import PieceIntegrator, state_at
 from rubhpc.integrate.changing_speed.pieces import Pieces
 from rubhpc.integrate.changing_speed.turns import Turns, bring_to_angles
 from rubhpc.integrate.changing_speed.twist_ramp import moved, sag_ramp
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rubhpc.fem.model import Model
-    from rubhpc.integrate.changing_speed.passing import Ended
+    from rubhpc.integrate.changing_speed.piece_integrator import PieceEnd
     from rubhpc.integrate.changing_speed.pieces import Block
     from rubhpc.integrate.modal_setup import ModalSetup
     from rubhpc.kernels.accumulators import Accumulator
@@ -140,8 +140,8 @@ def integrate_run_up(
     advice = [ripples.advice(speeds[at], lengths[at], lags[at], names) for ripples, at in judged]
     unit, none = unit_rotation(model.rotor), np.zeros(model.rotor.n_dof)
     piece = 0
-    ended: Ended | None = None  # the last piece
-    passing = Passing(clearance, friction, check, say)
+    ended: PieceEnd | None = None  # the last piece
+    integrator = PieceIntegrator(clearance, friction, check, say)
     if stages[0].at == (0, 0) and isinstance(initial, Initial):  # bearings let go before the first piece
         at_first = (float(column[0]) for column in (speeds, accelerations, angles, durations))
         setup = stages[0].pieces.setup(*at_first)
@@ -149,7 +149,7 @@ def integrate_run_up(
     of_pieces = speeds, accelerations, angles[:-1], durations, sizes
     for block, is_released in _blocks(stages, of_pieces):
         if is_released and reached is not None:
-            reached, ended, passing = state_at(reached, setup), None, passing.anew()
+            reached, ended, integrator = state_at(reached, setup), None, integrator.anew()
         setup, size, begins_at = block[0], int(sizes[piece]), piece
         if setup.model is not sagging:
             lift_samples(whole[:, begun : cuts[piece]], sagging)
@@ -163,22 +163,22 @@ def integrate_run_up(
             reached = start_of(initial, setup, clearance, law.speed[0])
             goes_on = is_contact_free(initial, reached)
         ramp = None
-        if setup.held.sagging_models and passing.is_open(reached, setup):
+        if setup.matrices.sagging_models and integrator.is_open(reached, setup):
             end, acceleration = piece + len(block), float(accelerations[piece])
             lasts = float(times[end] - times[piece])
-            ramp = sag_ramp(setup.held, acceleration, float(at_cuts[piece]), float(at_cuts[end]), lasts)
+            ramp = sag_ramp(setup.matrices, acceleration, float(at_cuts[piece]), float(at_cuts[end]), lasts)
             if not is_first:
                 reached = ramp.about_middle(reached, setup)
             elif not goes_on:  # at rest, while the sag moves
                 reached = moved(reached, setup, none, -ramp.rate)
         if ended is not None and not goes_on:
             jump = float(accelerations[piece]) - ended.acceleration
-            goes_on = passing.goes_over(setup, reached, ended, jump)
+            goes_on = integrator.goes_over(setup, reached, ended, jump)
         while not reason and (place := piece - begins_at) < len(block):
             first = int(cuts[piece])
             note(first / cuts[-1])
             before_it, follows = (earlier, before[piece]), goes_on or place > 0
-            passed = passing.take(block[place], size, reached, before_it, goes_on=follows)
+            passed = integrator.take(block[place], size, reached, before_it, goes_on=follows)
             reached, earlier = passed.end, passed.accumulators[-1]
             if late[piece]:  # the inertia of the twist does not follow immediately
                 seen = model.probe_rows[2, :, : unit.size] @ unit
@@ -198,7 +198,7 @@ def integrate_run_up(
                 reached = ramp.after(reached, setup)
         if reason:
             break
-        ended = passing.ended(block.last, size, float(accelerations[piece - 1]))
+        ended = integrator.ended(block.last, size, float(accelerations[piece - 1]))
     lift_samples(whole[:, begun : n_done * per_revolution], sagging)
     n_sample = n_done * per_revolution
     taken = np.unique(np.minimum(cuts, n_sample))

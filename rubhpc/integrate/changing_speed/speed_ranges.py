@@ -11,9 +11,9 @@ import numpy as np
 from rubhpc.fem.free_spin import unit_rotation
 from rubhpc.fem.probes import probes_at
 from rubhpc.fem.statics import at_rest_under, sag_under
-from rubhpc.integrate.changing_speed.followed_range import NARROWEST, followed_reach, rotor_of
+from rubhpc.integrate.changing_speed.interpolated_range import NARROWEST, interpolated_reach, rotor_of
 from rubhpc.integrate.changing_speed.mode_courses import NODES
-from rubhpc.integrate.changing_speed.piece_setup import HeldMatrices, PieceSetup, sagging
+from rubhpc.integrate.changing_speed.piece_setup import PieceSetup, RangeMatrices, sagging
 from rubhpc.integrate.changing_speed.range_library import speeds_of
 from rubhpc.integrate.changing_speed.ripples import Linear
 from rubhpc.integrate.packing import whole_system
@@ -70,7 +70,7 @@ class SpeedRanges:
 
     def hold(
         self, speed: float, acceleration: float, slope: float, guess: float | None = None
-    ) -> HeldMatrices:
+    ) -> RangeMatrices:
         """Matrices of the range that begins at a speed.
 
         That of a free spin, which may turn back, is in the middle of the range. `guess` (rad/s) is half of
@@ -92,13 +92,13 @@ class SpeedRanges:
         ranges = near_end, swing
         buffers = _BUFFERS.setdefault(fastest, {})
         at = acceleration, slope, ranges
-        held = HeldMatrices(
+        matrices = RangeMatrices(
             model, reduced, self.phasor, self._momentum, *at, slowest.sample_level, buffers, beside
         )
-        held.is_balanced = free is not None
+        matrices.is_balanced = free is not None
         if fastest.model.rotor.tabulated_speeds:
-            held.sagging_models = [model, *(other for other, _ in others)]
-        held.template = PieceSetup(
+            matrices.sagging_models = [model, *(other for other, _ in others)]
+        matrices.template = PieceSetup(
             scheme=fastest.scheme,
             model=model,
             reduced=reduced,
@@ -109,23 +109,23 @@ class SpeedRanges:
             law=fastest.law,
             accuracy=fastest.accuracy,
             displacement_limit=fastest.displacement_limit,
-            held=held,
-            speeds=speeds_of([speed], [complex(speed**2)], [0.0], [1.0], speed, held.sample_level),
+            matrices=matrices,
+            speeds=speeds_of([speed], [complex(speed**2)], [0.0], [1.0], speed, matrices.sample_level),
             place=0,
             most_energy=fastest.energy_limit,
         )
         for name in ("energy_limit", "sample_level", "clock"):  # for `with_values`, which takes them along
-            getattr(held.template, name)
+            getattr(matrices.template, name)
         tilted = model.rotor.gyroscopic @ model.sag
         if free is not None:
-            held.twist = sag_under(model.rotor, -free.share)
+            matrices.twist = sag_under(model.rotor, -free.share)
         force = -self._inertia - tilted if free is None else -0.5 * tilted
-        if held.sagging_models:  # dampers act against the rate of the sag
-            rotor, (_, below, above) = model.rotor, held.sagging_models
-            held.slope = (above.sag - below.sag) / ((NODES[2] - NODES[1]) * reach)
-            force = force - (rotor.damping + speed * rotor.gyroscopic) @ held.slope
-        held.lean = sag_under(model.rotor, force)
-        return held
+        if matrices.sagging_models:  # dampers act against the rate of the sag
+            rotor, (_, below, above) = model.rotor, matrices.sagging_models
+            matrices.slope = (above.sag - below.sag) / ((NODES[2] - NODES[1]) * reach)
+            force = force - (rotor.damping + speed * rotor.gyroscopic) @ matrices.slope
+        matrices.lean = sag_under(model.rotor, force)
+        return matrices
 
     def linear(self, speed: float, *, is_whole: bool = False) -> Linear:
         """The rotor without contact at a speed, rad/s, as the output node and probes see it.
@@ -175,7 +175,7 @@ class SpeedRanges:
             return stiffness, damping
 
         seen, soft = self.linear(speed, is_whole=True).seen, model.rotor.softness
-        return followed_reach(
+        return interpolated_reach(
             rotor_of(fastest, matrices, self.phasor, seen),
             speed,
             acceleration,

@@ -13,7 +13,7 @@ from rubhpc.integrate.measuring.samples import probe_part
 from rubhpc.integrate.record import State
 
 if TYPE_CHECKING:
-    from rubhpc.integrate.changing_speed.piece_setup import HeldMatrices, PieceSetup
+    from rubhpc.integrate.changing_speed.piece_setup import PieceSetup, RangeMatrices
 
 Floats = NDArray[np.float64]
 
@@ -69,10 +69,10 @@ class TwistRamp(NamedTuple):
 
 
 def sag_ramp(
-    held: HeldMatrices, acceleration: float, first: float, last: float, duration: float
+    matrices: RangeMatrices, acceleration: float, first: float, last: float, duration: float
 ) -> TwistRamp:
     """How bearings that follow the speed move the sag from the first speed to the last one, rad/s."""
-    begin, end = (held.sagging(0.0, acceleration, speed) for speed in (first, last))
+    begin, end = (matrices.sagging(0.0, acceleration, speed) for speed in (first, last))
     half = 0.5 * (end.sag - begin.sag)
     constant = 0.5 * (end.probe.constant - begin.probe.constant) if begin.probe and end.probe else None
     return TwistRamp(half, 2.0 / duration * half, constant)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rubhpc.integrate.marches.case_modes import CaseModes, NoClosedForm
 from rubhpc.integrate.marches.march import ALL_SAMPLES
-from rubhpc.integrate.marches.met_modes import MetModes, NoClosedForm
 from rubhpc.integrate.marches.modal import ModalMarch, slowest_fast
 from rubhpc.integrate.measuring.samples import no_record
 from rubhpc.kernels.case_progress import MODE_WANTED, NO_SECTIONS, Sections, restart_clock
@@ -100,7 +100,7 @@ class EventDrivenMarch(ModalMarch):
 
     def _enter_first(self, contact_force: Floats) -> None:
         """Enter the contact mode with which the case begins; forces (q,), N."""
-        self._modes = MetModes(self._setup.library(self._coefficient))
+        self._modes = CaseModes(self._setup.library(self._coefficient))
         self._enter(self._first_mask(contact_force))
 
     def _enter(self, mask: int) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rubhpc.integrate.marches.met_modes import NoClosedForm
+from rubhpc.integrate.marches.case_modes import NoClosedForm
 from rubhpc.integrate.marches.modal import Place
 from rubhpc.integrate.measuring.orbit_measures import LONGEST_PERIOD
 from rubhpc.integrate.periodic_motions.extrapolation import extrapolated

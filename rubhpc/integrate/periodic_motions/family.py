@@ -11,7 +11,7 @@ import numpy as np
 from rubhpc.errors import InputError
 from rubhpc.fem.assemble import assemble, model_at
 from rubhpc.fem.response import contact_free_amplitude, first_lateral_frequency
-from rubhpc.integrate.marches.met_modes import NoClosedForm
+from rubhpc.integrate.marches.case_modes import NoClosedForm
 from rubhpc.integrate.modal_setup import ModalSetup
 from rubhpc.integrate.packing import law_of
 from rubhpc.integrate.periodic_motions.collocated_motion import followed_motion

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.marches.met_modes import NoClosedForm
+from rubhpc.integrate.marches.case_modes import NoClosedForm
 from rubhpc.integrate.periodic_motions.piecewise_motion import Unfollowed
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from rubhpc.integrate.marches.case_modes import NoClosedForm
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
-from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.periodic_motions.piece_mode import Mode, know, mode_of, unknown_modes
 from rubhpc.integrate.periodic_motions.revolution import (
     Piece,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rubhpc.integrate.marches.met_modes import NoClosedForm
+from rubhpc.integrate.marches.case_modes import NoClosedForm
 from rubhpc.integrate.measuring.orbit_measures import PERIOD_TOLERANCE, closest_return
 from rubhpc.integrate.measuring.regimes import MOST_DOUBLED, MOST_EVENTS, Solution
 from rubhpc.integrate.packing import output_degrees

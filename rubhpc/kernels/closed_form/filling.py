@@ -13,7 +13,7 @@ from rubhpc.kernels._jit import jit, linked, linked_sum
 from rubhpc.kernels._struct import Struct
 from rubhpc.kernels.closed_form.courses import Courses, follow, follow_rates
 from rubhpc.kernels.closed_form.filling_energies import Losses, fill_energies
-from rubhpc.kernels.closed_form.retuning_exponentials import retune_bounds, retune_outputs, retune_powers
+from rubhpc.kernels.closed_form.filling_exponentials import fill_bounds, fill_outputs, fill_powers
 from rubhpc.kernels.contact_modes import ModeTables  # noqa: TC001 - part of a kernel's signature
 
 Floats = NDArray[np.float64]
@@ -113,12 +113,12 @@ def fill_at(
         tables.slip_re[mode, i, m], tables.slip_im[mode, i, m] = slip.real, slip.imag
         slip = slip * turning
         tables.slip_rate_re[mode, i, m], tables.slip_rate_im[mode, i, m] = slip.real, slip.imag
-    retune_powers(tables, mode, exponent, end, tick)
-    retune_bounds(tables, mode, exponent, end, tick)
+    fill_powers(tables, mode, exponent, end, tick)
+    fill_bounds(tables, mode, exponent, end, tick)
     _look(course.output, moved, seen)
     for o in range(course.output.shape[0]):
         course.row[o, m] = complex(seen[0, o], seen[1, o])
-    retune_outputs(tables.output[mode], course.row, exponent, end, interval, course.n_ahead)
+    fill_outputs(tables.output[mode], course.row, exponent, end, interval, course.n_ahead)
     losses = course.losses
     if tables.loss.shape[1] > 0:
         respond(losses.resisting_re, losses.resisting_im, shares, seen)

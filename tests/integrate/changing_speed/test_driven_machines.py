@@ -9,7 +9,7 @@ from closed_form import run_up
 from full_order_machine import Machine, driven_machine
 
 from rubhpc import Carrier, LumpedStator, Rig, Unbalance
-from rubhpc.integrate.changing_speed.passing import Passing
+from rubhpc.integrate.changing_speed.piece_integrator import PieceIntegrator
 from rubhpc.integrate.changing_speed.speed_ranges import SpeedRanges
 from rubhpc.rig.bearing_table import BearingTable
 from rubhpc.study.drive_law import DriveLaw
@@ -132,9 +132,9 @@ def test_a_whip_takes_all_that_the_spin_holds(monkeypatch):
     The speed swings as it falls; matrices are held over that, and contact modes not solved piece by piece.
     """
     held, taken = [], []
-    hold, take = SpeedRanges.hold, Passing.take
+    hold, take = SpeedRanges.hold, PieceIntegrator.take
     monkeypatch.setattr(SpeedRanges, "hold", lambda *at: held.append(at) or hold(*at))
-    monkeypatch.setattr(Passing, "take", lambda *at, **keys: taken.append(at) or take(*at, **keys))
+    monkeypatch.setattr(PieceIntegrator, "take", lambda *at, **keys: taken.append(at) or take(*at, **keys))
     rig, _ = machine(3)
     drive = {"torque": 0.0, "start": 200.0, "revolutions": 60, "inertia": DRIVE_INERTIA}
     found = run_up(rig, drive=drive, clearance=2e-4, friction=0.8, samples_per_revolution=32)

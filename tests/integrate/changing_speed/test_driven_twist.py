@@ -10,7 +10,7 @@ from overhung_pump import pump
 
 from rubhpc import LumpedStator, Probe, Rig, Unbalance
 from rubhpc.integrate.changing_speed.free_piece import Spin
-from rubhpc.integrate.changing_speed.passing import Passing
+from rubhpc.integrate.changing_speed.piece_integrator import PieceIntegrator
 
 DRIVE = {"torque": [8.0, 2.0], "speed": [0.0, 600.0], "inertia": 5e-3, "start": 320.0, "revolutions": 12}
 
@@ -75,13 +75,13 @@ def test_touches_make_pieces_short():
 def test_rub_that_comes_back_is_foreseen(monkeypatch):
     """Pieces alternate with and without touches: what braked a revolution ago is what brakes now."""
     passed, pieces = [], []
-    take, take_piece = Passing.take, Spin.take
+    take, take_piece = PieceIntegrator.take, Spin.take
 
     def counted(*at, **keys):
         pieces.append(take_piece(*at, **keys))
         return pieces[-1]
 
-    monkeypatch.setattr(Passing, "take", lambda *at, **keys: passed.append(at) or take(*at, **keys))
+    monkeypatch.setattr(PieceIntegrator, "take", lambda *at, **keys: passed.append(at) or take(*at, **keys))
     monkeypatch.setattr(Spin, "take", counted)
     drive = {"torque": 0.3, "start": "1300 rpm", "revolutions": 60, "inertia": 0.02}
     found = run_up("mokhtar2017", drive=drive, clearance=1e-4, friction=0.2, samples_per_revolution=64)

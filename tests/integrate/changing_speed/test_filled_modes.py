@@ -103,7 +103,7 @@ def test_energy_balances_while_the_unbalance_force_grows(growth):
         library.add(mask)
         tables, place = library.tables(), library.masks.index(mask)
         first = tables.n_eigenmode[place]
-        exponent = library._held[mask][1].exponent
+        exponent = library._solved_modes[mask][1].exponent
         assert exponent[first] == complex(growth, spin)
         shape = tables.motion_re[place] + 1j * tables.motion_im[place]
         if mask == 0:

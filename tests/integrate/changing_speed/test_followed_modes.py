@@ -84,7 +84,7 @@ def error_at(base, at, masks, place):
     worst = 0.0
     for mask in masks:
         assert library.add(mask)
-        assert library.follows(mask)
+        assert library.interpolates(mask)
         assert not library.tables().loss.size
         tables, row = library.tables(), library.masks.index(mask)
         found = maps(tables, row)

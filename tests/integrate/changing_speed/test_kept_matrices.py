@@ -37,11 +37,11 @@ def test_memory_of_many_ranges_is_bounded(motion, budget, monkeypatch):
     first, of_all = run_up(rig, **case), n_byte()
     greatest = max(held.n_byte for held in made)
     again, n_made = run_up(rig, **case), len(made)
-    assert n_made > 1 + pieces.MOST_HELD
+    assert n_made > 1 + pieces.MOST_AT_HAND
     most = of_all // 8
     assert most + 2 * greatest < 0.7 * of_all
     monkeypatch.setattr(pieces, budget, most)
-    monkeypatch.setattr(pieces, "MOST_HELD", 1)
+    monkeypatch.setattr(pieces, "MOST_AT_HAND", 1)
     found = run_up(rig, **case)
     assert n_byte() <= most + 2 * greatest
     for other in (again, found):

@@ -9,7 +9,7 @@ from equal_stators import in_ring
 from overhung_pump import pump
 from set_ups import prepared
 
-from rubhpc.integrate.changing_speed import passing
+from rubhpc.integrate.changing_speed import piece_integrator
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.record import State
 from rubhpc.rig.reading import with_keys
@@ -38,12 +38,12 @@ def test_masses_that_carry_a_shaft_come_to_rest_as_the_speed_falls(monkeypatch):
     rig = in_ring(with_keys(pump(), keys), 8, first=math.radians(11.5), radius=0.09)
     left = []
 
-    class Noted(passing.CollocationMarch):
+    class Noted(piece_integrator.CollocationMarch):
         def __init__(self, *given):
             left.append(self)
             super().__init__(*given)
 
-    monkeypatch.setattr(passing, "CollocationMarch", Noted)
+    monkeypatch.setattr(piece_integrator, "CollocationMarch", Noted)
     found = run_up(
         rig,
         speed_law=[(0.0, "2500 rpm"), (3.0, "5500 rpm"), (4.0, "5500 rpm"), (7.0, "2500 rpm")],

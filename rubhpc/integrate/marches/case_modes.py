@@ -16,7 +16,7 @@ class NoClosedForm(Exception):  # noqa: N818 - a state of the motion, never seen
     """
 
 
-class MetModes:
+class CaseModes:
     """Sets of closed contacts that a case has met, and the library that holds them.
 
     The kernel must not depend on what other cases have left in the library: it sees only sets that this case

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from rubhpc.integrate.case import MARCHES
 from rubhpc.integrate.changing_speed.range_library import RangeLibrary
+from rubhpc.integrate.marches.case_modes import NoClosedForm
 from rubhpc.integrate.marches.collocation import CollocationMarch
-from rubhpc.integrate.marches.met_modes import NoClosedForm
 from rubhpc.integrate.marches.modal import FAST, ModalMarch, Place
 from rubhpc.integrate.measuring.samples import empty_samples, following_accumulator
 from rubhpc.integrate.record import State
@@ -31,7 +31,7 @@ Complexes = NDArray[np.complex128]
 NEARLY_FAST = 0.8 * FAST  # frequency of a mode over the spin, above which its motion is taken over
 
 
-class Ended(NamedTuple):
+class PieceEnd(NamedTuple):
     """End of a piece."""
 
     setup: PieceSetup
@@ -41,7 +41,7 @@ class Ended(NamedTuple):
     acceleration: float  # rad/s^2
 
 
-def carried(before: Ended, jump: float, march: ModalMarch, setup: PieceSetup) -> Floats | None:
+def carried(before: PieceEnd, jump: float, march: ModalMarch, setup: PieceSetup) -> Floats | None:
     """Coordinates (2, m) of the end of a piece in the modes of the next one; None where they have none.
 
     Parameters
@@ -54,10 +54,10 @@ def carried(before: Ended, jump: float, march: ModalMarch, setup: PieceSetup) ->
     (mask, z), old, next_ = before.left, before.setup, march.library
     if mask != march.mask or not isinstance(next_, RangeLibrary):
         return None
-    place = _inside(setup.held.within(old.spin))
-    common = setup.held.reduced.spin + place * setup.held.reach
+    place = _inside(setup.matrices.within(old.spin))
+    common = setup.matrices.reduced.spin + place * setup.matrices.reach
     modes = next_.eigenmodes(march.mask, place)
-    known = before.library.eigenmodes(march.mask, _inside(old.held.within(common)))
+    known = before.library.eigenmodes(march.mask, _inside(old.matrices.within(common)))
     if modes is None or known is None:
         return None
     fast = np.flatnonzero(np.abs(known.exponent) > NEARLY_FAST * abs(setup.spin))
@@ -69,17 +69,17 @@ def carried(before: Ended, jump: float, march: ModalMarch, setup: PieceSetup) ->
     return found
 
 
-def _rung(modes: Eigenmodes, before: Ended, jump: float, setup: PieceSetup) -> Complexes:
+def _rung(modes: Eigenmodes, before: PieceEnd, jump: float, setup: PieceSetup) -> Complexes:
     """What a sudden change of the acceleration adds to coordinates (m,) by sag, force and stiffness."""
     old, n = before.setup, modes.motion.shape[0] // 2
     turning = complex(old.clock.growth, old.spin)
     factor, force = complex(old.speeds.factor[old.place]), old.spin**2 - 1j * before.acceleration
-    project = setup.reduced.project[:, : setup.held.lean.size]
-    moved = -jump * np.concatenate([project @ setup.held.lean, project @ setup.held.slope])
+    project = setup.reduced.project[:, : setup.matrices.lean.size]
+    moved = -jump * np.concatenate([project @ setup.matrices.lean, project @ setup.matrices.slope])
     none = np.zeros(len(modes.constant))
     found = modes.entered(moved, none, turning, -1j * jump / force * factor, before.time)
     whirl = modes.response(turning, factor)[:n] * np.exp(turning * before.time)
-    pushed = 0.5 * modes.enter[:, n:] @ (jump * setup.held.momentum)
+    pushed = 0.5 * modes.enter[:, n:] @ (jump * setup.matrices.momentum)
     by_whirl = pushed @ whirl / (turning - modes.exponent)
     found += by_whirl + pushed @ whirl.conj() / (turning.conjugate() - modes.exponent)
     return found
@@ -90,7 +90,7 @@ def _inside(place: float) -> float:
     return min(max(place, -1.0), 1.0)
 
 
-class Passed(NamedTuple):
+class PieceResult(NamedTuple):
     """Result of a piece."""
 
     whole: Floats  # (n_row, n_sample), about the sag, until the next piece
@@ -101,7 +101,7 @@ class Passed(NamedTuple):
     reason: str  # why it could not continue, or ""
 
 
-class Passing:
+class PieceIntegrator:
     """Integrates the pieces of a case by one march, which begins again at each of their speeds."""
 
     def __init__(
@@ -118,9 +118,9 @@ class Passing:
         self._lasted = 0.0  # s, duration of that piece
         self._room: dict[int, Samples] = {}  # by number of samples of a piece
 
-    def anew(self) -> Passing:
+    def anew(self) -> PieceIntegrator:
         """Another one of the same case, which has not begun."""
-        return Passing(*self._case, self._check, self._say)
+        return PieceIntegrator(*self._case, self._check, self._say)
 
     def take(
         self,
@@ -131,7 +131,7 @@ class Passing:
         *,
         is_balanced: bool = False,
         goes_on: bool = False,
-    ) -> Passed:
+    ) -> PieceResult:
         """Integrate one piece; `earlier` has the contact forces before it, and how long ago they began, s.
 
         `is_balanced`: its energies are requested. `goes_on`: the piece before was integrated too, with the
@@ -156,7 +156,7 @@ class Passing:
             self._say(f"a case at {setup.spin * 30.0 / math.pi:.0f} rpm")
 
     def goes_over(
-        self, setup: PieceSetup, begun: State | Place, before: Ended | None, jump: float = 0.0
+        self, setup: PieceSetup, begun: State | Place, before: PieceEnd | None, jump: float = 0.0
     ) -> bool:
         """Whether fast modes go on from a piece before, of another range or acceleration, into the next one.
 
@@ -165,7 +165,7 @@ class Passing:
         march = self._march
         if march is None or before is None or not isinstance(begun, Place):
             return False
-        if not (before.setup.held.is_followed and setup.held.is_followed):
+        if not (before.setup.matrices.is_interpolated and setup.matrices.is_interpolated):
             return False
         try:
             march.begin(setup, begun)
@@ -176,13 +176,13 @@ class Passing:
             self.left = before.left[0], z
         return z is not None
 
-    def ended(self, setup: PieceSetup, n_sample: int, acceleration: float) -> Ended | None:
+    def ended(self, setup: PieceSetup, n_sample: int, acceleration: float) -> PieceEnd | None:
         """End of the last piece in its own modes, if it has any; its acceleration is in rad/s^2."""
         library = self._march.library if self._march is not None else None
         if self.left is None or not isinstance(library, RangeLibrary):
             return None
         mask, z = self.left
-        return Ended(setup, library, (mask, z.copy()), setup.interval * n_sample, acceleration)
+        return PieceEnd(setup, library, (mask, z.copy()), setup.interval * n_sample, acceleration)
 
     def is_open(self, begun: State | Place, setup: PieceSetup) -> bool:
         """Whether nothing touches as a piece begins, about the sag of its middle too."""
@@ -216,7 +216,7 @@ class Passing:
     def _keep_fast(self, march: ModalMarch, setup: PieceSetup, n_sample: int) -> None:
         """Let fast modes that follow the speed continue unchanged."""
         library = march.library
-        if self.left is not None and isinstance(library, RangeLibrary) and library.follows(march.mask):
+        if self.left is not None and isinstance(library, RangeLibrary) and library.interpolates(march.mask):
             march.keep_fast(self.left, setup.spin, self._longer(setup, n_sample))
 
     def _pass(
@@ -226,7 +226,7 @@ class Passing:
         n_sample: int,
         earlier: tuple[Accumulator, float],
         is_balanced: bool,
-    ) -> Passed:
+    ) -> PieceResult:
         model = setup.model
         samples = self._room_for(model, n_sample)
         samples.whole[:] = 0.0
@@ -244,7 +244,7 @@ class Passing:
         gained = march.energy() - before if is_balanced else math.nan
         self.left = march.reached_in()
         self._lasted = setup.interval * n_sample
-        return Passed(samples.whole, accumulators, march.n_step, march.reached(), gained, reason or "")
+        return PieceResult(samples.whole, accumulators, march.n_step, march.reached(), gained, reason or "")
 
     def _room_for(self, model: Model, n_sample: int) -> Samples:
         if n_sample not in self._room:

@@ -142,7 +142,7 @@ def rotor_of(setup: ModalSetup, matrices: Matrices, phasor: Complexes, seen: Flo
     return Rotor(matrices, phasor, touched, np.concatenate([seen, near], axis=1), top)
 
 
-def followed_reach(
+def interpolated_reach(
     rotor: Rotor,
     speed: float,
     acceleration: float,
@@ -241,7 +241,7 @@ def _of_part(rotor: Rotor, part: Ints) -> Rotor:
 
 
 def _nodes(rotor: Rotor, middle: float, half: float) -> list[tuple[Complexes, Complexes]] | None:
-    """Modes at `NODES`, the middle first; None where they cannot be followed."""
+    """Modes at `NODES`, the middle first; None where they cannot be interpolated."""
     first, *others = (_modes(*rotor.matrices(middle + place * half)) for place in NODES)
     nodes = [first]
     for other in others:

@@ -16,7 +16,7 @@ GONE = -40.0  # exponent of what has died away
 
 
 @linked
-def retune_powers(tables: ModeTables, mode: int, exponent: Complexes, end: int, tick: float) -> None:
+def fill_powers(tables: ModeTables, mode: int, exponent: Complexes, end: int, tick: float) -> None:
     """Exponentials of the first `end` coordinates."""
     n_level = tables.power_re.shape[1]
     power_re, power_im = tables.power_re[mode], tables.power_im[mode]
@@ -35,7 +35,7 @@ def retune_powers(tables: ModeTables, mode: int, exponent: Complexes, end: int, 
 
 
 @linked
-def retune_bounds(tables: ModeTables, mode: int, exponent: Complexes, end: int, tick: float) -> None:
+def fill_bounds(tables: ModeTables, mode: int, exponent: Complexes, end: int, tick: float) -> None:
     """What bounds and paces have of the exponentials of the first `end` coordinates."""
     longest = tick * 2.0 ** (tables.power_re.shape[1] - 1)
     weight = np.empty(end)
@@ -50,7 +50,7 @@ def retune_bounds(tables: ModeTables, mode: int, exponent: Complexes, end: int, 
 
 
 @linked
-def retune_outputs(
+def fill_outputs(
     output: Floats, row: Complexes, exponent: Complexes, end: int, interval: float, n_ahead: int
 ) -> None:
     """Outputs at `n_ahead` coming samples by the first `end` coordinates; zeros that stay are left.
