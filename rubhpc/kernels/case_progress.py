@@ -14,7 +14,7 @@ from rubhpc.kernels.contact_pairs import rim_sense
 Floats = NDArray[np.float64]
 
 FINISHED, DIVERGED, CONTACT_UNSOLVED, MODE_WANTED, PAUSED, UNDER_WAY = range(6)  # outcomes
-MOST_STEPS = 50_000  # of one call: the caller checks for stop signals between calls
+MOST_STEPS = 50_000  # of one call at most: the caller checks for stop signals between calls
 NONE = -1  # no contact mode wanted, no energies to add, no halving
 
 

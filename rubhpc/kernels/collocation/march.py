@@ -93,6 +93,7 @@ MOST_AT_ONCE = 64  # events at one tick, and as many for each pair
 UNDECIDED = 8  # events at one tick for each pair: friction on its bound then goes on for a shortest step
 BRIEF = 512.0  # ticks: a closed pair does not part for less where another one touches
 NO_SLIP = 1e-9  # m/s
+MOST_WORK = 5e7  # of one call, in products of a step's loads with its coordinates, 0.2 s or so
 PARTED = 1e-9  # of the rim's speed: gap rate above which a pair has parted in an impact
 
 
@@ -420,7 +421,10 @@ def advance_by_collocation(
     s, x, state, after = nodes.at.size, case.x, case.state, solution.after
     n_x, top = x.size, tables.is_filled.size - 1
     allowed = (RECORDED if is_recorded else ALLOWED) * accuracy
-    last_step = progress.n_step + MOST_STEPS
+    work = float(n_x * s * bodies.load.shape[0])
+    if trail is not None:
+        work *= 1 + trail.columns.shape[1]
+    last_step = progress.n_step + max(min(MOST_STEPS, int(MOST_WORK / work)), 1)
     todo, pair, kind, acceleration = STEPPING, -1, NORMAL, 0.0
     tried, attempt, first_tried, is_still = STICKING, 0, STICKING, False
     trial = int(np.int64(-1))

@@ -8,21 +8,26 @@ import numpy as np
 import pytest
 from closed_form import read_rig, simulate
 from contact_answers import masses
+from equal_stators import in_ring
 from independent_contact import run
 from record_distance import MOTIONS
 from reference_bodies import squared_slope
+from set_ups import prepared
 from trial_rig import trial_rig
 
 import rubhpc
 from rubhpc import InputError
 from rubhpc.fem.beam import stator_foreshortening
 from rubhpc.integrate import case
+from rubhpc.integrate.marched_record import march_record
 from rubhpc.integrate.marches import collocation
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.marches.march import ended_in
+from rubhpc.integrate.record import State
 from rubhpc.integrate.scheme import Scheme
 from rubhpc.rig.reading import with_keys
 from rubhpc.rig.stators import LumpedStator, MatrixStator
+from rubhpc.study.contact_keys import Contact
 
 RUB = {"speed": 170.0, "clearance": "80 um", "friction": 0.2, "transient": 0, "revolutions": 2}
 CLOSE = RUB | {"clearance": "40 um"}
@@ -354,3 +359,17 @@ def test_reason_of_an_end_names_the_revolution_before_what_may_help(reason):
     what, _, fix = said.partition(" in revolution 7")
     assert what + fix == reason
     assert ";" not in what
+
+
+def test_a_case_with_long_steps_is_interrupted_soon():
+    """Its steps take a hundred times as long as those of one stator; a call is shorter by that."""
+    rig = in_ring(rubhpc.read_rig("mokhtar2017"), 16)
+    setup, calls = prepared(rig, 200.0, contact=Contact()), []
+
+    def check():
+        calls.append(march.n_step)
+
+    march = collocation.CollocationMarch(setup, 60e-6, 0.2, State.at_rest(setup.model), check)
+    march_record(march, setup, 4)
+    assert np.diff(calls).max() < 500
+    assert calls[-1] > 1000
