@@ -265,7 +265,8 @@ class Balance:
         )  # N / rho over stiffness
         if self._law.kind == "penalty":
             return (1.0 - ratio) / self._clearance
-        # Hertz: y^3 = ratio (c + y^2) of the root y of the approach, by Newton's method from above.
+        assert self._law.kind == "hertz"
+        # y^3 = ratio (c + y^2) of the root y of the approach, by Newton's method from above.
         y = ratio + np.cbrt(ratio * self._clearance)
         for _ in range(_NEWTON):
             excess = y**3 - ratio * (self._clearance + y**2)
