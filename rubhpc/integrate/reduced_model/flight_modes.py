@@ -45,6 +45,7 @@ LONGER_IN_BORES = 2  # levels by which it is longer where contact may last and t
 SHORTEST_LEVEL = 6  # ticks of the shortest step, as a power of two
 QUIET = 3e-4  # m/s2, of a rotor that bores catch, by the rounding of its displacement in the shortest step
 MOST_SLOTS = 16
+CORRECTIONS = 2  # of coordinates: modes interpolated between speeds are not quite inverse to what enters them
 RESTING = 1e-9  # of the largest exponent: smaller sums of two exponents count as zero
 ENOUGH = 0.3  # of the accuracy: share of the foreshortening that may be missed
 UNBENT = 1e-8  # bending displacement over the largest of a stator; smaller ones count as zero
@@ -168,12 +169,16 @@ class FlightModes:
         """Coordinates (nx,) of a reduced motion (2 n,) at the shaft's angle."""
         n, turned = self.n_complex, (cosine + 1j * sine) ** self.orders
         response = (self.response.real * turned.real - self.response.imag * turned.imag).sum(axis=1)
-        z = self.enter @ (motion - response)
-        z += self.enter @ (
-            motion - response - (self.shape @ z).real
-        )  # modes between others are not quite inverse
+        z = self._entered(motion - response)
         z[n - self.orders.size : n] = turned
         return np.concatenate([z[:n].real, z[:n].imag, z[n:].real])
+
+    def _entered(self, motions: Floats) -> Complexes:
+        """Coordinates (nm, ...) of reduced motions (2 n, ...) without the responses to forces."""
+        z: Complexes = self.enter @ motions
+        for _ in range(CORRECTIONS):
+            z += self.enter @ (motions - (self.shape @ z).real)
+        return z
 
     @cached_property
     def sense(self) -> float:
@@ -197,7 +202,9 @@ class FlightModes:
     def kicks(self) -> Complexes:
         """Rates of the modes by unit loads on the local motions (R, nm)."""
         n = self.local.shape[1]
-        return np.ascontiguousarray((self.enter[:, n:] @ self.local.T).T)
+        return np.ascontiguousarray(
+            self._entered(np.concatenate([np.zeros((n, len(self.local))), self.local.T])).T
+        )
 
     def bodies(self, friction: float, clearance: Floats) -> Bodies:
         """Bodies and pairs of a case; clearance (q,) at rest, m."""

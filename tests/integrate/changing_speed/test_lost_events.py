@@ -9,10 +9,15 @@ from equal_stators import in_ring
 from overhung_pump import pump
 from set_ups import prepared
 
+from rubhpc.integrate.case import run_case
 from rubhpc.integrate.changing_speed import piece_integrator
+from rubhpc.integrate.changing_speed.case import record_run_up
 from rubhpc.integrate.marches.event_driven import EventDrivenMarch
 from rubhpc.integrate.record import State
 from rubhpc.rig.reading import with_keys
+from rubhpc.study.initial import CONTACT_FREE, Initial
+from rubhpc.study.speed_law import SpeedLaw
+from rubhpc.study.tables import Recording
 
 
 @pytest.mark.parametrize("overlap", [-1e-6, 1e-6])
@@ -53,3 +58,16 @@ def test_masses_that_carry_a_shaft_come_to_rest_as_the_speed_falls(monkeypatch):
     )
     assert not left
     assert np.hypot(found.vertical, found.horizontal).max() == pytest.approx(377.6e-6, rel=1e-3)
+
+
+def test_contacts_by_collocation_last_as_at_constant_speed():
+    """Velocities of interpolated modes are rates of their displacements: else each contact ends at once."""
+    rig = in_ring(pump(), 8, first=0.2)
+    law = SpeedLaw(time=(0.0, 0.1), speed=(300.0, 300.02))
+    recording = Recording(transient=0, revolutions=law.n_revolution, samples_per_revolution=128)
+    setup = prepared(rig, 300.02, samples=128, friction_law="coulomb")
+    case = {"initial": Initial(from_=CONTACT_FREE), "clearance": 1.5e-4, "friction": 0.05}
+    passage = record_run_up(setup, law, recording=recording, **case).measures
+    steady = run_case(setup, recording=recording, **case).measures
+    assert passage["steps"] < 2.0 * steady["steps"]
+    assert passage["contact_impulse"] == pytest.approx(steady["contact_impulse"], rel=0.05)
