@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 D = TypeVar("D")
 
+CORRECTIONS = 2  # of coordinates in interpolated modes
+
 
 class RangeMatrices:
     """Matrices at a speed, rad/s, and an acceleration, rad/s^2, with their solved contact modes.
@@ -255,6 +257,7 @@ class PieceSetup(ModalSetup):
             turning,
             np.ones(1, dtype=np.int64),
             _with_rates(modes.response(turning, factor)[:, None], np.array([turning])),
+            corrections=CORRECTIONS if self.matrices.is_interpolated else 0,
         )
 
     def library(self, friction: float) -> ModeLibrary:

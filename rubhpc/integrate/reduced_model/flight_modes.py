@@ -45,7 +45,6 @@ LONGER_IN_BORES = 2  # levels by which it is longer where contact may last and t
 SHORTEST_LEVEL = 6  # ticks of the shortest step, as a power of two
 QUIET = 3e-4  # m/s2, of a rotor that bores catch, by the rounding of its displacement in the shortest step
 MOST_SLOTS = 16
-CORRECTIONS = 2  # of coordinates: modes interpolated between speeds are not quite inverse to what enters them
 RESTING = 1e-9  # of the largest exponent: smaller sums of two exponents count as zero
 ENOUGH = 0.3  # of the accuracy: share of the foreshortening that may be missed
 UNBENT = 1e-8  # bending displacement over the largest of a stator; smaller ones count as zero
@@ -119,6 +118,8 @@ class FlightModes:
         Multiples of it that are exponents of forces: 1 of the unbalance, then those of harmonics.
     response : (2 n, f)
         Motions under them.
+    corrections : int
+        Of coordinates: what enters modes that are interpolated is not quite their inverse.
     """
 
     setup: Settings
@@ -129,6 +130,7 @@ class FlightModes:
     turning: complex
     orders: NDArray[np.int64]
     response: Complexes
+    corrections: int = 0
 
     @cached_property
     def n_complex(self) -> int:
@@ -169,14 +171,13 @@ class FlightModes:
         """Coordinates (nx,) of a reduced motion (2 n,) at the shaft's angle."""
         n, turned = self.n_complex, (cosine + 1j * sine) ** self.orders
         response = (self.response.real * turned.real - self.response.imag * turned.imag).sum(axis=1)
-        z = self._entered(motion - response)
+        z = self._corrected(self.enter @ (motion - response), motion - response, max(self.corrections, 1))
         z[n - self.orders.size : n] = turned
         return np.concatenate([z[:n].real, z[:n].imag, z[n:].real])
 
-    def _entered(self, motions: Floats) -> Complexes:
-        """Coordinates (nm, ...) of reduced motions (2 n, ...) without the responses to forces."""
-        z: Complexes = self.enter @ motions
-        for _ in range(CORRECTIONS):
+    def _corrected(self, z: Complexes, motions: Floats, count: int) -> Complexes:
+        """Coordinates (nm, ...) of reduced motions (2 n, ...), refined so many times."""
+        for _ in range(count):
             z += self.enter @ (motions - (self.shape @ z).real)
         return z
 
@@ -202,9 +203,9 @@ class FlightModes:
     def kicks(self) -> Complexes:
         """Rates of the modes by unit loads on the local motions (R, nm)."""
         n = self.local.shape[1]
-        return np.ascontiguousarray(
-            self._entered(np.concatenate([np.zeros((n, len(self.local))), self.local.T])).T
-        )
+        rates = np.concatenate([np.zeros((n, len(self.local))), self.local.T])
+        kicks = self._corrected(self.enter[:, n:] @ self.local.T, rates, self.corrections)
+        return np.ascontiguousarray(kicks.T)
 
     def bodies(self, friction: float, clearance: Floats) -> Bodies:
         """Bodies and pairs of a case; clearance (q,) at rest, m."""
