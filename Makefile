@@ -38,7 +38,7 @@ ORDINARY := not bench and not long
 FAST := $(ORDINARY) and not slow and not serial
 DESTRUCTIVE := tests/faults tests/mpi tests/storage tests/running
 
-check: $(VENV)/.ready ## the inner loop, about a minute: style, and the fast tests with the layers of imports
+check: $(VENV)/.ready ## the inner loop, a minute and a half: style, and the fast tests with the layers of imports
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/python -m pytest $(PARALLEL) -m "$(FAST)"
