@@ -24,8 +24,6 @@ from rubhpc.running.launch import FIRST_SPEAKS, launch, leave
 from rubhpc.streams import lasting_streams
 from rubhpc.threads import VARIABLES
 
-# name -> (module and function in `rubhpc.commands`, what it does).
-# The figure commands come from `postproc.catalogue`.
 # Words of click, and plain ones.
 _PLAIN = {
     "a valid integer range": "a whole number",
@@ -33,6 +31,8 @@ _PLAIN = {
     "a valid float range": "a number",
     "a valid float": "a number",
 }
+# name -> (module and function in `rubhpc.commands`, what it does).
+# The figure commands come from `postproc.catalogue`.
 COMMANDS = {
     "run": ("run:run", "Run or resume a study; the word run may be omitted."),
     "plan": ("run:plan", "Cases, bytes, files, core-hours; done, failed and missing cases."),

@@ -155,9 +155,8 @@ class Spin:
             before = self._ended
             self._integrator.left = before.left if before else None
             is_same = before is not None and before.setup.matrices is of_range
-            goes_on = (is_same and of_range.is_interpolated) or self._integrator.goes_over(
-                setup, reached, before
-            )
+            goes_on = is_same and of_range.is_interpolated
+            goes_on = goes_on or self._integrator.goes_over(setup, reached, before)
             passed = self._integrator.take(
                 setup, length, reached, self._earlier, is_balanced=True, goes_on=goes_on
             )
